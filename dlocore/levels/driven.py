@@ -1,4 +1,4 @@
-"""Motions that no cable can follow and that only the solve reveals: grippers that close beside it or drive it in.
+"""Grippers that close beside the cable or drive it into something: no cable can follow, but only the motion shows it.
 
 Grasps that hold from the beginning are checked before anything is solved (`problem/checks.py`). The path of a grasp
 that closes later begins where the cable is by then, and whether two strands meet is not known beforehand.

@@ -42,8 +42,8 @@ class Ended:
 def ended(level: Level, quality: Quality, method: str, solved: Solved, count: int, monitor: Monitor) -> Ended:
     """Return the result to show for a solution by "spacetime" or "paper" after `count` iterations.
 
-    A "spacetime" solution that does not converge, or iterates beyond all bounds, are replaced by the march that it
-    started from.
+    If "spacetime" does not converge, or the iterates grow beyond all bounds, the march that it started from is shown
+    instead.
     """
     problem, iterations = level.problem, counted(count, "iteration")
     if solved.converged:

@@ -61,7 +61,7 @@ def march_level(
         free_knots: whether time knots may be added, see `run_level`.
         rough: whether a finer grid follows. On a rough grid strands may meet, and a motion may leave its plane, just
             because of the grid, so that is left open.
-        known: a march of this grid, which is repeated only if a fine grid calls for more.
+        known: a march of this grid, which is repeated only for what rough grids leave open.
         before: the previous level: contact begins as stiff as it had to be there, strains are believed that are not far
             above its own, and a start that is to settle does so from its start.
         watch: whether to keep the cable from folding within a span, see `run_level`.

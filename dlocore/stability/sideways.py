@@ -105,7 +105,7 @@ def may_leave_plane(problem: Problem) -> bool:
 
 
 def lacks_twist(problem: Problem) -> bool:
-    """Tell whether a stress-free bent cable could not leave its plane because the scene switches twist off."""
+    """Tell whether a cable that is bent when stress-free can't leave its plane because the scene switches twist off."""
     return problem.scene.effects.get("twist", "auto") == "off" and _bends_in_plane(problem)
 
 
@@ -115,7 +115,7 @@ def solved_in_space(ways: list[str]) -> str:
 
 
 def _bends_in_plane(problem: Problem) -> bool:
-    """Tell whether a stress-free bent cable moves in a plane that it may leave, or turn over in."""
+    """Tell whether a cable that is bent when stress-free moves in a plane that it may leave, or turn over in."""
     return _may_be_bent(problem) and problem.plane.dimensions == 2 and not problem.start.twisted
 
 
@@ -126,7 +126,7 @@ def _may_lie_flat(problem: Problem) -> bool:
 
 
 def _turns_in_plane(problem: Problem) -> bool:
-    """Tell whether a stress-free bent cable is solved in space with twist and may nevertheless lie flat."""
+    """Tell whether a cable that is bent when stress-free is solved in space with twist but may lie flat."""
     start = problem.start
     return _may_be_bent(problem) and problem.nc == 4 and not (start.aside or start.twisted)
 
@@ -141,7 +141,7 @@ def _may_be_bent(problem: Problem) -> bool:
 def _leasts_of_bent(
     problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float
 ) -> Iterator[float]:
-    """Do what `_leasts` does for a stress-free bent cable, whose sections turn as it leaves the plane.
+    """Do what `_leasts` does for a cable that is bent when stress-free: its sections turn as it leaves the plane.
 
     The stiffness is that of the motion in space with twist, evaluated in the planar states, against displacements out
     of the plane and turns of the sections.
@@ -211,7 +211,7 @@ def _is_weighed_down(problem: Problem) -> bool:
 def _leasts_of_lying(
     problem: Problem, grid: Grid, states: Floats, times: list[float], bends: Floats, slack: float
 ) -> Iterator[float]:
-    """Do what `_leasts` does for a stress-free bent cable that lies on a table, whose sections may turn over.
+    """Do what `_leasts` does for a cable that is bent when stress-free and lies on a table: its sections may turn over.
 
     The energy of turns p of the sections is half the integral of EI kappa kappa_0 p^2 + GJ p'^2: the stress-free bend
     kappa_0 turns with them. As elsewhere, p counts as the displacement D/sqrt(8) p.
@@ -251,7 +251,7 @@ def of_one_time(history: History) -> History:
 
 
 def is_looked_at(problem: Problem) -> bool:
-    """Tell whether the stiffness across its plane is that of a straight stress-free cable that may leave the plane."""
+    """Tell whether the stiffness across the plane is that of a cable straight when stress-free that may leave it."""
     start = problem.start
     return not (problem.on_table or _may_be_bent(problem) or start.aside or start.twisted)
 

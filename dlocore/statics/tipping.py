@@ -67,7 +67,7 @@ def tipped(problem: Problem, grid: Grid, monitor: Monitor, at: float = 0.0, star
 
 def may_fall(problem: Problem) -> bool:
     """Tell whether a start of a problem is to be tipped if it would fall."""
-    # a straight stress-free cable in a plane that it may leave is given a bow instead, if `is_unstable` says so
+    # a cable straight when stress-free, in a plane that it may leave, gets a bow instead if `is_unstable` says so
     bowed = problem.plane.dimensions == 3 and problem.rest_plane.dimensions == 2 and is_looked_at(problem)
     return not problem.touches and not bowed
 
