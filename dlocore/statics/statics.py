@@ -40,7 +40,7 @@ Floats = NDArray[np.float64]
 
 RESTLESS = "shape.settle"  # the field that the error names if a start finds no rest
 LEVELS = (9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385)
-_WOUND = np.pi  # [rad]: a start that turns more than this along its length may have equilibria beside the one downhill
+_WOUND = np.pi  # [rad]: a start that turns more than this along its length may have other equilibria than that downhill
 _COARSE = 12  # control points: on so few, a start may settle to a different one of several equilibria than on more
 _ELSEWHERE = 0.02  # of the length: starts farther apart than this may be different equilibria
 _FAR = 0.05  # of the length: a start that settles no farther away has hardly passed by another equilibrium
