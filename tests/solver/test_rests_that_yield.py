@@ -42,7 +42,7 @@ def test_it_tells_of_twist() -> None:
         environment=Environment(gravity=(0.0, 0.0, 0.0)),
         horizon=1.0,
     )
-    assert f"{TOLD}: at rest it is twisted by 4 rad/m, and it yields at 2 rad/m" in equilibrium(scene, at=1.0).message
+    assert f"{TOLD}: at rest it is twisted by 4 rad/m, but it yields at 2 rad/m" in equilibrium(scene, at=1.0).message
     assert TOLD not in equilibrium(scene, at=0.4).message
 
 

@@ -172,7 +172,7 @@ def test_times_of_few_repeats_are_not_compared_but_errors_are(measured: Study) -
     for now, before in ((changed(once, time=1.8), often), (changed(often, time=1.8), once)):
         comparison = compare(now, before)
         assert comparison.changes == ()
-        assert f"times of {len(once.runs)} runs are not compared: less than 3 repeats" in words(comparison)
+        assert f"times of {len(once.runs)} runs are not compared: fewer than 3 repeats" in words(comparison)
     assert "not compared" not in words(compare(often, often))
     assert {change.quantity for change in compare(changed(once, time=1.8, error=2.0), often).worse} == {"error"}
 
