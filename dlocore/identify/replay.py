@@ -313,7 +313,7 @@ class Replay:
 def no_such_cable(error: SceneError) -> str:
     """Return a message on why a cable can't lie as its markers show, without the fields of a shape made from them."""
     shaped = error.field.startswith("shape.")
-    return f"Such a cable can't lie like that: {'it would be folded or stretched' if shaped else str(error).rstrip('.')}"
+    return f"A cable can't lie like that: {'it would be folded or stretched' if shaped else str(error).rstrip('.')}"
 
 
 def common_references(recordings: Sequence[Recording]) -> Floats | None:
