@@ -126,7 +126,7 @@ def test_not_converging_exits_with_3_and_still_writes(tmp_path: Path, capsys: py
     assert main(["predict", written(tmp_path, scene), *arguments]) == 3
     message = capsys.readouterr().err
     assert message.startswith("max_iterations: ")
-    assert "take method march" in message  # the remedy
+    assert "use method march" in message  # the remedy
     assert all(output.stat().st_size > 1000 for output in outputs)
 
 

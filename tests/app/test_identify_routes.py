@@ -75,7 +75,7 @@ def test_the_service_identifies_a_cable_that_a_scene_takes(client: TestClient, a
 def test_what_is_known_of_the_cable_is_kept_where_it_is_not_sought(client: TestClient, asked: dict[str, Any]) -> None:
     answer = client.post(ADDRESS, json={**asked, "cable": KNOWN, "parameters": ["drag"]}).json()
     assert {name: answer["cable"][name] for name in KNOWN} == KNOWN
-    assert "kept at what is assumed: bending" not in answer["message"]
+    assert "kept at an assumed value: bending" not in answer["message"]
     assert answer["parameters"][0]["value"] == pytest.approx(DRAG.drag, rel=0.3)
 
 

@@ -282,7 +282,7 @@ def test_a_density_that_was_assumed_is_told_of(density: float | None) -> None:
     known, unknown = still(name="known", linear_density=density), still(41, name="unknown", linear_density=None)
     found = identify([unknown, known], names=("drag",))
     assert found.cable.linear_density == (density or 0.04)
-    told = "0.04 kg/m is assumed, and stiffnesses, damping and drag are in proportion to it." in found.message
+    told = "0.04 kg/m is assumed. Stiffnesses, damping and drag are in proportion to it." in found.message
     assert told is (density is None)
 
 
@@ -472,7 +472,7 @@ def test_strong_damping_of_a_cable_that_may_turn_at_its_ends_is_told_of(damping:
     assert not any(h.towards is not None for h in recording.holds)
     cable = Cable(length=1.0, diameter=0.005, linear_density=0.05, bending_stiffness=4.905e-3, bending_damping=damping)
     found = identify([recording], cable, Environment(drag=0.0125), names=("drag",), iterations=1)
-    assert ("EI may be found far too large" in found.message) is told
+    assert ("EI may come out far too large" in found.message) is told
 
 
 def hung(*u: float, held: tuple[int, ...]) -> Recording:

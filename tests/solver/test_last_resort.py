@@ -72,7 +72,7 @@ def test_the_iterations_have_both_attempts_and_the_march(given: Prediction, foun
 
 def test_who_keeps_the_grid_is_told_that_the_least_squares_did_not_converge(asked: Scene, given: Prediction):
     assert (given.status, given.accuracy.method) == ("max_iterations", "spacetime")
-    assert "take method march. The surface is that of the march it started from." in given.message
+    assert "use method march. The surface is that of the march it started from." in given.message
     np.testing.assert_array_equal(given.surface.control_points, marched(asked).surface.control_points)
 
 
