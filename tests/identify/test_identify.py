@@ -442,7 +442,7 @@ def test_what_is_kept_at_an_assumed_value_is_told_of() -> None:
 def test_what_is_sought_or_told_by_a_recording_is_not_told_of_as_assumed() -> None:
     message = identify([still(diameter=0.004)], names=("bending_stiffness", "bending_damping", "drag")).message
     assert message.endswith(
-        "assumed: torsional_stiffness 0.00125 N m^2, drag_quadratic 0 N s^2/m^3, axial_stiffness 625 N."
+        "assumed value: torsional_stiffness 0.00125 N m^2, drag_quadratic 0 N s^2/m^3, axial_stiffness 625 N."
     )
 
 
