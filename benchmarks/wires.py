@@ -211,7 +211,8 @@ def critical_of_equilibria(wire: Wire, n_u: int = GRID, largest: float = 1.5) ->
     found = equilibrium(hanging(wire), n_u=n_u)
     while rotation < largest * mean:
         step = STEP if rotation > 0.8 * mean else 0.1 * mean
-        shape = ControlPoints(control_points=found.control_points, knots=found.knots_u)
+        unstretched = np.zeros(len(found.control_points))
+        shape = ControlPoints(control_points=found.control_points, knots=found.knots_u, strain=unstretched)
         found = equilibrium(hanging(wire, step, shape=shape), at=1.0, n_u=n_u)
         rotation += step
         now = float(found.control_points[-1, 3] - found.control_points[0, 3])

@@ -91,7 +91,11 @@ class PointsShape(Model):
 
 
 class ControlPointsShape(Model):
-    """A clamped cubic spline, given by its control points."""
+    """A clamped cubic spline, given by its control points.
+
+    The cable lies along its curve at its own length, however the control points are spaced. Only with `strain` the
+    parameter of the spline is the material coordinate u.
+    """
 
     kind: Literal["control_points"]
     control_points: list[ControlPoint] = Field(
@@ -99,7 +103,7 @@ class ControlPointsShape(Model):
         max_length=MAX_CONTROL_POINTS,
         description=(
             "Control points [m, m, m] or [m, m, m, rad]; the fourth is the angle of the sections relative to a frame "
-            "without twist."
+            "without twist. A curve up to 10 % longer or shorter than the cable is scaled to it about its middle."
         ),
         examples=[[[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]],
     )
@@ -113,8 +117,9 @@ class ControlPointsShape(Model):
     strain: Long[Annotated[Number, Field(ge=-MAX_STRAIN, le=MAX_STRAIN)]] | None = Field(
         default=None,
         description=(
-            "Axial strain, one number for each control point, at the mean of three successive inner knots; absent: the "
-            "cable has its own length, whatever the length of the spline."
+            "Axial strain, one number for each control point, at the mean of three successive inner knots. The control "
+            "points are then those of r(u), with u the material coordinate. Absent: the cable lies along the curve of "
+            "the spline without strain."
         ),
         examples=[[0.001, 0.001, 0.0, 0.0]],
     )

@@ -127,7 +127,8 @@ def _settled(grasps: tuple[Grasp, Grasp], sag: Callable[[Floats], Floats]) -> Sc
     found = equilibrium(scene, n_u=65)
     if found.status != "converged":
         raise RuntimeError(f"the start did not settle: {found.message}")
-    return replace(scene, shape=ControlPoints(control_points=found.control_points, knots=found.knots_u))
+    own = np.zeros(len(found.control_points))  # strain: they are in material coordinates
+    return replace(scene, shape=ControlPoints(control_points=found.control_points, knots=found.knots_u, strain=own))
 
 
 def make(name: str, family: str, scene: Scene) -> Case:

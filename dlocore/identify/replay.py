@@ -205,7 +205,9 @@ class Replay:
         q = fit.shape(cable, gravity, u[seen], markers, np.array(positions), self._guess)
         self._guess = q
         v = None if self.at_rest else fit.velocity(q, u[seen], self.start_speeds[on], np.array(rates))
-        shape = ControlPoints(control_points=q, knots=fit.grid.knots, velocity=v, settle=self.at_rest)
+        shape = ControlPoints(
+            control_points=q, knots=fit.grid.knots, velocity=v, settle=self.at_rest, strain=np.zeros(len(q))
+        )
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
         switches: dict[str, Switch] = {"inertia": "on", "twist": "on" if candidate.twist else "off"}

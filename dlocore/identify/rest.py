@@ -108,7 +108,7 @@ class Rest:
         fit = start_fit(length, self.resolution.n_u, tuple(held))
         gravity = cast(Floats, environment.gravity)
         q = fit.shape(cable, gravity, u[seen], self.markers[frame, seen], np.array(targets))
-        shape = ControlPoints(control_points=q, knots=fit.grid.knots)
+        shape = ControlPoints(control_points=q, knots=fit.grid.knots, strain=np.zeros(len(q)))
         if candidate.twist:
             shape = with_sections(shape, candidate.rest_curvature, candidate.turn, frames)
         switches: dict[str, Switch] = {"twist": "on" if candidate.twist else "off"}

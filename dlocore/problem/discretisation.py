@@ -88,7 +88,7 @@ def grid_on(problem: Problem, knots: Floats) -> Grid:
     velocity = np.zeros(start.shape) if given is None else np.ascontiguousarray(problem.rates(given, spin))
     grid = Grid(knots, start, velocity, partial(_tables_of, problem), partial(_history_of, problem))
     waypoints = any(g.start == 0.0 and isinstance(g.path, Waypoints) for g in problem.scene.grasps)
-    if waypoints or len(curve.control_points) > 4:
+    if waypoints or len(curve.control_points) > 4 or not curve.even:
         start, tables = consistent_start(problem, grid), grid.tables
         grid = replace(grid, start=start, find_tables=lambda knots: tables)
     return grid

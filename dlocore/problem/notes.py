@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.paths import Move, Waypoints
-from dlocore.scene.scene import AUTO_TARGET, Grasp, Points, Scene
+from dlocore.scene.scene import AUTO_TARGET, ControlPoints, Grasp, Scene, Straight
 from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.words import in_mm
 
@@ -46,7 +46,7 @@ def scene_notes(scene: Scene) -> list[str]:
 
 def cable_notes(scene: Scene) -> list[str]:
     """Return notes on a scene's cable and start shape."""
-    return [*_of_units(scene), *_of_points(scene)]
+    return [*_of_units(scene), *_of_curve(scene)]
 
 
 def start_notes(scene: Scene, start: StartCurve) -> list[str]:
@@ -100,18 +100,27 @@ def _of_units(scene: Scene) -> list[str]:
     return [f"the cable is {thick}, so it is heavier than any metal: linear_density is its mass per length in kg/m"]
 
 
-def _of_points(scene: Scene) -> list[str]:
-    """Return a note on points that were scaled to the cable's length, or that the start misses."""
-    if not isinstance(scene.shape, Points):
+def _of_curve(scene: Scene) -> list[str]:
+    """Return notes on a start curve that was scaled to the cable's length, is uneven, or misses its points."""
+    if isinstance(scene.shape, Straight):
         return []
     length = scene.cable.length
     start = start_curve(scene.shape, length)
+    notes = []
+    if start.slid > SAME_START * length:
+        notes.append(
+            "|r'| of the control points of the shape is not 1 everywhere: the cable lies along their curve at its own "
+            f"length, which moves its places, also those that grippers hold, by up to {in_mm(start.slid)}. If the "
+            "control points are those of r(u), with u the material coordinate, give `strain` as zeros, one for each"
+        )
     differ = abs(start.length_given - length) > SAME_LENGTH * length
     if differ and start.ends_moved > SAME_ENDS * length:
+        points = "control points" if isinstance(scene.shape, ControlPoints) else "points"
         return [
-            f"the points of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: their curve is "
-            f"scaled to the cable about its middle, which moves an end by up to {in_mm(start.ends_moved)}, and with it "
-            "a gripper that holds it there"
+            *notes,
+            f"the {points} of the shape are {start.length_given:.4g} m long and the cable {length:.4g} m: their curve "
+            f"is scaled to the cable about its middle, which moves an end by up to {in_mm(start.ends_moved)}, and with "
+            "it a gripper that holds it there",
         ]
     if start.fit_missed > (scene.quality.target_error or AUTO_TARGET * length):
         return [
@@ -119,7 +128,7 @@ def _of_points(scene: Scene) -> list[str]:
             "addition to their noise. The estimated error does not include this: give points that are as long as the "
             "cable, more of them at sharp bends, or the control points of a spline"
         ]
-    return []
+    return notes
 
 
 def _of_times(scene: Scene) -> list[str]:

@@ -152,9 +152,13 @@ class ControlPoints(Checked):
     angle of the sections against a frame without twist (docs/model.md eq. 19). `settle` and `velocity` are those of
     `Straight`.
 
+    The cable lies along the curve of the spline at its own length, however the control points are spaced. Theta and
+    velocity stay with the places of the curve. With `strain` or `material` the spline is instead r(u), with u the
+    material coordinate.
+
     `material` is what the sections remember of an earlier motion. `strain` (n,) is the axial strain at the start: at
     the Greville abscissae, the means of each three successive inner knots, and linear between them. With None the
-    strain is zero, whatever the length of the spline.
+    strain is zero.
     """
 
     control_points: ArrayLike

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from dlocore.errors import MILLIMETRES, SceneError
+from dlocore.kernels.basis import GAUSS_4, gauss_points
 from dlocore.scene.scene import FARTHEST
 from dlocore.shape.smoothing import smooth, stiffness_of
 from dlocore.spline import DEGREE
@@ -32,6 +33,7 @@ TURNED_BACK = -0.5  # cosine of two successive steps
 MISSED = 0.01  # of the length: a fit with fewer spans may miss the points by this much more on average
 MIN_SPANS = 8  # of a fit: enough for few points to show three bends
 MIN_UNIT_SPANS, MAX_UNIT_SPANS = 64, 4096  # a curve that needs more is too sharp for a cable, and is fitted with fewer
+OF_GIVEN = 2  # spans for each one of a spline that is refitted in its arclength: its other columns may turn in each
 KEPT = 64  # cached fits, each at most some 100 kB
 
 
@@ -74,6 +76,31 @@ def fit_points(points: Floats, length: float) -> PointFit:
 def forget_fits() -> None:
     """Clear the cached fits, so that a prediction takes as long as the first one from its points."""
     _fit.cache_clear()
+    _in_arclength.cache_clear()
+
+
+def in_arclength(knots: Floats, columns: Floats) -> BSpline | None:
+    """Return a cubic spline refitted in the arclength of its curve, or None if a cable cannot follow the curve.
+
+    Args:
+        knots: clamped, from 0 (n + 4,) [m].
+        columns: control points (n, >= 3); the first three columns are the curve [m], relative to one of its points.
+    """
+    return _in_arclength(knots.tobytes(), columns.tobytes(), columns.shape[1])
+
+
+@lru_cache(maxsize=KEPT)
+def _in_arclength(knots: bytes, columns: bytes, count: int) -> BSpline | None:
+    """Refit as `in_arclength` does. The last splines are cached."""
+    spline = BSpline(np.frombuffer(knots), np.frombuffer(columns).reshape(-1, count), DEGREE)
+    cuts = np.unique(spline.t)
+    steps = max(STEPS, -(-MIN_STEPS // (len(cuts) - 1)))
+    grid = np.append(np.linspace(cuts[:-1], cuts[1:], steps, endpoint=False, axis=1).ravel(), cuts[-1])
+    u, width = gauss_points(np.pad(grid, DEGREE, mode="edge"), *GAUSS_4)
+    lengths = (np.sqrt((spline(u, 1)[:, :3] ** 2).sum(axis=1)) * width).reshape(len(grid) - 1, -1).sum(axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    spans = min(max(MIN_UNIT_SPANS, OF_GIVEN * (len(cuts) - 1)), MAX_UNIT_SPANS)
+    return _unit_speed(spline, (grid, along), 0.0, float(along[-1]), spans)
 
 
 @lru_cache(maxsize=KEPT)
@@ -246,26 +273,27 @@ def _arclength(spline: BSpline) -> tuple[Floats, Floats]:
     return grid, s - np.interp(0.0, grid, s)
 
 
-def _unit_speed(spline: BSpline, measured: tuple[Floats, Floats], start: float, end: float) -> BSpline | None:
+def _unit_speed(
+    spline: BSpline, measured: tuple[Floats, Floats], start: float, end: float, spans: int = MIN_UNIT_SPANS
+) -> BSpline | None:
     """Return the piece of a curve, `measured` by `_arclength`, between two arclengths [m] as a spline in arclength.
 
-    Its spans are halved until | |r'| - 1 | <= SPEED_ERROR. None if the curve has a cusp or is too sharp for
-    MAX_UNIT_SPANS.
+    Further columns stay with the places of the curve. It begins with `spans` spans, which are halved until
+    | |r'| - 1 | <= SPEED_ERROR. None if the curve has a cusp or is too sharp for MAX_UNIT_SPANS.
     """
     grid, along = measured
-    speed = np.sqrt((spline(grid, 1) ** 2).sum(axis=1))
+    speed = np.sqrt((spline(grid, 1)[:, :3] ** 2).sum(axis=1))
     if not speed.min() > SLOWEST:
         return None
     parameter = CubicHermiteSpline(along, grid, 1 / speed)
-    spans = MIN_UNIT_SPANS
     while spans <= MAX_UNIT_SPANS:
         s = np.linspace(start, end, spans + 1)
         x = parameter(s)
-        first, last = (t / np.linalg.norm(t) for t in spline(x[[0, -1]], 1))
+        first, last = (t / np.linalg.norm(t[:3]) for t in spline(x[[0, -1]], 1))
         ends: Any = ([(1, first)], [(1, last)])
         curve = make_interp_spline(s - start, spline(x), k=DEGREE, bc_type=ends)
         between = (s[:-1, None] + (end - start) / spans * np.array([0.25, 0.5, 0.75])).ravel() - start
-        if np.abs(np.sqrt((curve(between, 1) ** 2).sum(axis=1)) - 1).max() <= SPEED_ERROR:
+        if np.abs(np.sqrt((curve(between, 1)[:, :3] ** 2).sum(axis=1)) - 1).max() <= SPEED_ERROR:
             return curve
         spans *= 2
     return None

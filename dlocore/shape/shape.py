@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,14 @@ from dlocore.kernels.projection import on_knots
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Material, Points, Shape, Straight
 from dlocore.spline import DEGREE, greville, uniform_knots
 
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
 Floats = NDArray[np.float64]
 
-SPEED_RANGE = (0.5, 1.5)  # of |r'|: a coarse spline of a hairpin stays inside, evenly spaced control points don't
+SPEED_RANGE = (0.5, 1.5)  # of |r'| in material coordinates: a coarse spline of a hairpin stays inside
+UNEVEN = 1e-3  # of |r'|: control points that deviate more from 1 define only a curve, not the places of the cable on it
+_SAME_SPEED = 1e-9  # of |r'|
 SAME_ANGLE = 1e-9  # [rad]
 SAME_SPIN = 1e-6  # [rad/s]
 _SPUN = 8  # places in each span at which the spin of the sections is computed
@@ -56,6 +61,8 @@ class StartCurve(SplineCurve):
         fit_missed: root mean square of the part of them that neighbouring points share, which is not noise [m].
         length_given: length of the curve without its strain, before it was scaled to the cable [m].
         ends_moved: how far the scaling moved the end that it moved farther [m]; 0 if the curve was given exactly.
+        slid: largest distance of a place from where uneven control points had it, before the curve was scaled to the
+            cable [m]; 0 if they are even.
         theta: angle of the sections, a spline with control points (n, 1) [rad], or None if it is the same everywhere.
         theta_rate: its rate, a spline with control points (n, 1) [rad/s], or None if no section spins.
         strain: coordinates u (k,) [m], rising, and the axial strain there (k,), or None if there is none.
@@ -73,6 +80,7 @@ class StartCurve(SplineCurve):
     fit_missed: float = 0.0
     length_given: float = 0.0
     ends_moved: float = 0.0
+    slid: float = 0.0
     theta: SplineCurve | None = None
     theta_rate: SplineCurve | None = None
     strain: tuple[Floats, Floats] | None = None
@@ -92,6 +100,11 @@ class StartCurve(SplineCurve):
         """Whether its sections are turned, or turn, against each other or against what they remember."""
         rate = self.theta_rate
         return self.theta is not None or (rate is not None and _turned(rate.control_points, SAME_SPIN, self.material))
+
+    @cached_property
+    def even(self) -> bool:
+        """Whether |r'| is 1 + strain everywhere. Without strain this is so only of a straight spline."""
+        return float(np.abs(_speed(self)[0] - 1.0).max()) < _SAME_SPEED
 
     def strain_at(self, u: Floats) -> Floats:
         """Return the axial strain (k,) at u (k,) [m]."""
@@ -189,13 +202,49 @@ def _given(shape: ControlPoints, length: float) -> StartCurve:
     unstrained = "" if curve.strain is None else f" without `strain` ({MAX_STRAIN:.0%} at most)"
     check_length("shape.control_points", f"control points of the whole cable{unstrained}", given, length)
     slowest, fastest = float(speed.min()), float(speed.max())
+    curve = replace(curve, length_given=given)
+    if curve.strain is None and curve.material is None:
+        return curve if max(1.0 - slowest, fastest - 1.0) <= UNEVEN else _in_arclength(curve, length)
     if not (slowest >= SPEED_RANGE[0] and fastest <= SPEED_RANGE[1]):
         allowed = (
             f"|r'|{unstrained} from {SPEED_RANGE[0]:g} to {SPEED_RANGE[1]:g} everywhere, as u is the cable's own "
             "arclength: a straight cable has its control points at the means of three successive knots"
         )
         raise SceneError("shape.control_points", f"|r'| from {slowest:.3g} to {fastest:.3g}", allowed)
-    return replace(curve, length_given=given)
+    return curve
+
+
+def _in_arclength(given: StartCurve, length: float) -> StartCurve:
+    """Refit the curve of control points in its own arclength, and scale it about its middle to the cable's length [m].
+
+    The angle of the sections, the velocity and the spin stay with the places of the curve.
+    """
+    from dlocore.shape.fit import in_arclength
+
+    origin = given.control_points[0]
+    beside = {name: getattr(given, name) for name in ("theta", "velocity", "theta_rate")}
+    columns = {name: part.control_points for name, part in beside.items() if part is not None}
+    curve = in_arclength(given.knots, np.column_stack([given.control_points - origin, *columns.values()]))
+    if curve is None:
+        raise _too_sharp(given)
+    u, end = np.linspace(0.0, 1.0, _PLACES), float(curve.t[-1])
+    slid = np.linalg.norm(origin + curve(end * u)[:, :3] - given(length * u), axis=1).max()
+    knots, control, ends_moved = _to_length(curve, length, origin)
+    values = np.split(curve.c[:, 3:], np.cumsum([part.shape[1] for part in columns.values()]), axis=1)
+    splines: dict[str, Any] = {
+        name: SplineCurve(knots=knots, control_points=c) for name, c in zip(columns, values, strict=False)
+    }
+    return replace(given, knots=knots, control_points=control, ends_moved=ends_moved, slid=float(slid), **splines)
+
+
+def _too_sharp(given: StartCurve) -> SceneError:
+    """Return the error for control points of a curve that is too sharp for a cable."""
+    u = np.linspace(0.0, given.knots[-1], _PLACES)
+    tangents = given(u, 1)
+    tangents /= np.maximum(np.linalg.norm(tangents, axis=1), 1e-300)[:, None]
+    at = u[int(np.argmin((tangents[1:] * tangents[:-1]).sum(axis=1)))]
+    allowed = "control points of a curve that a cable can follow, without corners, which never turns back on itself"
+    return SceneError("shape.control_points", f"a curve that turns too sharply about u = {at:.3g} m", allowed)
 
 
 def _turned(angles: Floats, same: float, material: Material | None) -> bool:
@@ -222,12 +271,8 @@ def _fitted(shape: Points, length: float) -> StartCurve:
     points = cast(Floats, shape.points)
     middle = points.mean(axis=0)
     fit = fit_points(points - middle, length)
-    scale = length / float(fit.curve.t[-1])
-    centre = fit.curve(np.linspace(0.0, fit.curve.t[-1], 65)).mean(axis=0)
-    knots, at = fit.curve.t * scale, np.minimum(fit.at * scale, length)
-    knots[-DEGREE - 1 :] = length
-    control = middle + centre + scale * (fit.curve.c - centre)
-    ends = np.linalg.norm(fit.curve.c[[0, -1]] - centre, axis=1)
+    at = np.minimum(fit.at * (length / float(fit.curve.t[-1])), length)
+    knots, control, ends_moved = _to_length(fit.curve, length, middle)
     off = _offsets(SplineCurve(knots=knots, control_points=control), at, points)
     distance = np.sqrt((off**2).sum(axis=1))
     alike = float((off[1:] * off[:-1]).sum(axis=1).mean())
@@ -239,8 +284,22 @@ def _fitted(shape: Points, length: float) -> StartCurve:
         fit_max=float(distance.max()),
         fit_missed=math.sqrt(max(alike, 0.0)),
         length_given=fit.length_given,
-        ends_moved=abs(scale - 1.0) * float(ends.max()),
+        ends_moved=ends_moved,
     )
+
+
+def _to_length(curve: "BSpline", length: float, origin: Floats) -> tuple[Floats, Floats, float]:
+    """Scale a curve in arclength, given relative to `origin` (3,) [m], about its middle to a length [m].
+
+    Returns:
+        Its knots [m], its control points (n, 3) [m], and how far the end moved that moved farther [m].
+    """
+    scale, c = length / float(curve.t[-1]), curve.c[:, :3]
+    centre = curve(np.linspace(0.0, curve.t[-1], 65))[:, :3].mean(axis=0)
+    knots = curve.t * scale
+    knots[-DEGREE - 1 :] = length
+    ends = np.linalg.norm(c[[0, -1]] - centre, axis=1)
+    return knots, origin + centre + scale * (c - centre), abs(scale - 1.0) * float(ends.max())
 
 
 def _offsets(curve: SplineCurve, at: Floats, points: Floats) -> Floats:

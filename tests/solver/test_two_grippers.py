@@ -34,11 +34,15 @@ def hanging(hold: str) -> Scene:
 
 
 def for_the_rod(scene: Scene) -> Scene:
-    """Return the scene with its start as control points, which the rod takes, and whose tangents the grippers hold."""
+    """Return the scene with its start as control points, which the rod takes, and whose tangents the grippers hold.
+
+    They are in material coordinates, as the rod has them, and so lie where they do on the grid.
+    """
     problem = pose(scene)
     grid = make_grid(problem, 25)
     world = problem.plane.world(grid.start)
-    return replace(scene, shape=ControlPoints(control_points=world, knots=grid.knots, settle=True))
+    shape = ControlPoints(control_points=world, knots=grid.knots, strain=np.zeros(len(world)), settle=True)
+    return replace(scene, shape=shape)
 
 
 @pytest.mark.parametrize("hold", ["point", "tangent"])
