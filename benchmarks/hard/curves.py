@@ -1,12 +1,15 @@
 """Start shapes: curves of given length from their tangents, and the faults of curves seen by a camera."""
 
 import numpy as np
+from scipy.interpolate import make_lsq_spline
 
 from benchmarks.hard.draft import Draft, Floats, Rng, Room, chance, pick, spread
-from dlocore import Points, Straight
+from dlocore import ControlPoints, Points, Straight
+from dlocore.spline import DEGREE, uniform_knots
 
 SAMPLES = 96  # points on a curve
 FINE = 4 * SAMPLES  # ... on a curve with a sharp bend
+SMOOTH = {"arc", "inflections", "nearly straight"}  # kinds that a spline of few control points can follow
 
 
 def along(tangents: Floats, length: float) -> Floats:
@@ -98,6 +101,20 @@ def as_seen(r: Rng, d: Draft, points: Floats) -> Points:
     return Points(points=points)
 
 
+def as_spline(r: Rng, d: Draft, points: Floats) -> ControlPoints:
+    """Return 4 to 20 unevenly spaced control points of a spline along points (k, 3), in space sometimes twisted."""
+    x = np.linspace(0.0, 1.0, len(points))
+    x += r.uniform(-0.7, 0.7) * np.sin(2.0 * np.pi * x) / (2.0 * np.pi)
+    count, twist = int(r.integers(4, 21)), 0.0
+    spline = make_lsq_spline(x, points, uniform_knots(count, 1.0), k=DEGREE)
+    long = float(np.linalg.norm(np.diff(spline(np.linspace(0.0, 1.0, FINE)), axis=0), axis=1).sum())
+    if d.room == "space" and chance(r, 0.2):
+        d.families.append("geometry: twisted control points")
+        twist = r.uniform(-3.0, 3.0)
+    rows = np.column_stack([spline.c * d.length / long, twist * np.linspace(0.0, 1.0, count)])
+    return ControlPoints(control_points=rows)
+
+
 def _scatter(r: Rng, count: int, room: Room) -> Floats:
     free = {"flat": [1, 1, 0], "upright": [1, 0, 1], "space": [1, 1, 1]}[room]
     return r.normal(size=(count, 3)) * free
@@ -117,6 +134,8 @@ def start(r: Rng, d: Draft, *, straight: float = 0.35) -> None:
             direction = np.array([0.0, 0.0, -1.0])
         d.shape = Straight(direction=direction)
         d.families.append("geometry: straight")
+        if d.splined:
+            d.shape = as_spline(r, d, length * np.outer(np.linspace(0.0, 1.0, SAMPLES), direction))
         return
     kind = pick(r, {"arc": 3, "inflections": 2, "hairpin": 1, "loop": 1, "cusp": 1, "nearly straight": 2, "helix": 1})
     if kind == "helix" and room != "space":
@@ -136,4 +155,4 @@ def start(r: Rng, d: Draft, *, straight: float = 0.35) -> None:
         points = wave(length, spread(r, 1e-12, 1e-3), r.choice([0.5, 1.0, 1.5]), room)
     else:
         points = helix(length, r.uniform(1.0, 3.0), max(r.uniform(0.2, 1.0), 8 * d.diameter / length))
-    d.shape = as_seen(r, d, points)
+    d.shape = as_spline(r, d, points) if d.splined and kind in SMOOTH else as_seen(r, d, points)

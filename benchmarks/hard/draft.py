@@ -27,6 +27,7 @@ class Draft:
         cable: fields of `Cable`.
         room: directions in which the motion goes.
         families: kinds of hardness, "group: kind".
+        splined: whether smooth starts are given by control points.
         speed, acceleration, jump: the largest of the motion [m/s, m/s^2], and the largest jump of its velocity [m/s].
     """
 
@@ -42,6 +43,7 @@ class Draft:
     quality: Quality = field(default_factory=Quality)
     room: Room = "flat"
     families: list[str] = field(default_factory=list)
+    splined: bool = False
     speed: float = 0.0
     acceleration: float = 0.0
     jump: float = 0.0

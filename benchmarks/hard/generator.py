@@ -26,6 +26,7 @@ from dlocore.problem.time_grid import smallest_n_t
 IMPOSSIBLE = 0.05  # share of scenes that no cable can follow
 CROWDED = 1000  # seed from which on scenes have several obstacles
 HEAVY = 2000  # seed from which on cables carry point masses; obstacles are as below CROWDED
+SPLINED = 3000  # seed from which on smooth starts are given by control points; the rest is as below CROWDED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,14 +52,15 @@ def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
     """Draw the scene `index` of a seed; `small` uses a grid of about ten by twenty control points, for quick tests.
 
     Scenes of seeds from CROWDED to HEAVY - 1 have two to four obstacles each; of other seeds, some scenes have one.
-    From HEAVY on, the cables carry one to three point masses of a hundredth to three times their own mass.
+    From HEAVY to SPLINED - 1, the cables carry one to three point masses of a hundredth to three times their own mass.
+    From SPLINED on, smooth starts are given by unevenly spaced control points.
     """
     r = np.random.default_rng([seed, index])
     length = 1.0 if chance(r, 0.6) else spread(r, 0.05, 50.0)
     thick = spread(r, 0.002, 0.02) if chance(r, 0.5) else 0.005 * length
     cable = {"diameter": min(thick, 0.04 * length), "linear_density": spread(r, 0.01, 1.0)}
     room = _room(r)
-    d = Draft(length=length, cable=cable, room=room, gravity=draw_gravity(r, room))
+    d = Draft(length=length, cable=cable, room=room, gravity=draw_gravity(r, room), splined=seed >= SPLINED)
     if not 0.2 <= length <= 5.0:
         d.families.append("geometry: a cable of " + ("5 to 50 m" if length > 1 else "0.05 to 0.2 m"))
     draw_motion(r, d)
@@ -69,7 +71,7 @@ def draw(seed: int, index: int, *, small: bool = False) -> Drawn:
     draw_damping(r, d, damping)
     draw_memory(r, d)
     draw_switches(r, d)
-    if seed >= HEAVY:
+    if HEAVY <= seed < SPLINED:
         draw_masses(r, d)
     possible = not chance(r, IMPOSSIBLE)
     if possible:

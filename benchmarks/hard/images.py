@@ -7,12 +7,27 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dlocore import Box, Capsule, Cylinder, Move, PointMass, Points, Scene, Sphere, SplineSurface, Straight, Waypoints
+from dlocore import (
+    Box,
+    Capsule,
+    ControlPoints,
+    Cylinder,
+    Move,
+    PointMass,
+    Points,
+    Scene,
+    Sphere,
+    SplineSurface,
+    Waypoints,
+)
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Path
 from dlocore.scene.scene import Shape
+from dlocore.shape.shape import start_curve
 
 Floats = NDArray[np.float64]
+
+_PLACES = 2001  # along a start: the spin of the frame without twist is integrated over them
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,6 +147,8 @@ def seen(scene: Scene, image: Image) -> Scene:
 
 
 def _shape(shape: Shape, image: Image, length: float) -> Shape:
+    if isinstance(shape, ControlPoints):
+        return _spline(shape, image, length)
     order = -1 if image.backwards else 1
     velocity = shape.velocity
     if velocity is not None:
@@ -139,11 +156,42 @@ def _shape(shape: Shape, image: Image, length: float) -> Shape:
         velocity = velocity[::order] if velocity.ndim == 2 else velocity
     if isinstance(shape, Points):
         return replace(shape, points=image.points(shape.points)[::order], velocity=velocity)
-    if isinstance(shape, Straight):
-        direction = np.asarray(shape.direction) / np.linalg.norm(np.asarray(shape.direction))
-        start = np.asarray(shape.start) + (length * direction if image.backwards else 0.0)
-        return replace(shape, start=image.points(start), direction=order * image.vectors(direction), velocity=velocity)
-    raise TypeError("control points carry angles and memory against a director")
+    direction = np.asarray(shape.direction) / np.linalg.norm(np.asarray(shape.direction))
+    start = np.asarray(shape.start) + (length * direction if image.backwards else 0.0)
+    return replace(shape, start=image.points(start), direction=order * image.vectors(direction), velocity=velocity)
+
+
+def _spline(shape: ControlPoints, image: Image, length: float) -> ControlPoints:
+    """Return the image of control points. Angles change their sign in a mirror, and if the cable is reversed."""
+    if shape.material is not None:
+        raise TypeError("what the sections remember is relative to a director")
+    order = -1 if image.backwards else 1
+    sign = order * np.linalg.det(image.frame)
+    rows, knots, velocity = np.asarray(shape.control_points), shape.knots, shape.velocity
+    if knots is not None:
+        knots = image.length * (length - np.asarray(knots) if image.backwards else np.asarray(knots))[::order]
+    if velocity is not None:
+        given = np.atleast_2d(velocity)
+        moving = image.vectors(given[:, :3], image.length / image.time)
+        if given.shape[1] == 4:
+            spin = given[:, 3:] + (_spin_of_frame(shape, length) if image.backwards else 0.0)
+            moving = np.column_stack([moving, sign / image.time * spin])
+        velocity = moving[::order] if np.ndim(velocity) == 2 else moving[0]
+    return replace(
+        shape,
+        control_points=np.column_stack([image.points(rows[:, :3]), sign * rows[:, 3]])[::order],
+        knots=knots,
+        velocity=velocity,
+        strain=None if shape.strain is None else np.asarray(shape.strain)[::order],
+    )
+
+
+def _spin_of_frame(shape: ControlPoints, length: float) -> float:
+    """Return the spin of the frame without twist at the end of a start [rad/s]; at the beginning it has none."""
+    curve = start_curve(shape, length)
+    assert curve.theta_rate is not None
+    u = np.linspace(0.0, length, _PLACES)
+    return float(curve.spin_at(u)[-1] - curve.theta_rate(u)[-1, 0])
 
 
 def _path(path: Path, image: Image) -> Path:

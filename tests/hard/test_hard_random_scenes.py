@@ -4,10 +4,11 @@ from collections import Counter
 
 import pytest
 
-from benchmarks.hard.generator import IMPOSSIBLE, draw
+from benchmarks.hard.generator import IMPOSSIBLE, SPLINED, draw
 from benchmarks.hard.judge import run
 from benchmarks.random_reference import PATIENT, WRONG
 from benchmarks.random_reference import compare as compare_with_reference
+from dlocore import ControlPoints
 
 SEED = 2
 COUNT = 300
@@ -33,6 +34,16 @@ def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first
             assert record["status"] != "converged" or told, (index, record["message"])
         else:
             assert record["status"] != "converged", (index, record["families"])
+
+
+def test_smooth_starts_by_control_points_end_with_a_finite_answer():
+    drawn = [one for one in (draw(SPLINED, index, small=True) for index in range(12)) if one.possible]
+    splined = [one for one in drawn if isinstance(one.make().shape, ControlPoints)]
+    assert len(splined) > len(drawn) // 3
+    for one in splined:
+        record = run(one, DEADLINE, False, measured="checked")
+        assert record["status"] not in ("exception", "refused"), (one.index, record["message"])
+        assert record["laws"]["finite"], one.index
 
 
 @pytest.mark.parametrize(("seed", "index"), [(2, 125), (3, 28), (10, 783)])
