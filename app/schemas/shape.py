@@ -105,7 +105,7 @@ class ControlPointsShape(Model):
             "Control points [m, m, m] or [m, m, m, rad]; the fourth is the angle of the sections relative to a frame "
             "without twist. A curve up to 10 % longer or shorter than the cable is scaled to it about its middle."
         ),
-        examples=[[[0, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]],
+        examples=[[[0, 0, 0], [0.32, 0.1, 0], [0.665, 0.1, 0], [0.985, 0, 0]]],
     )
     knots: Long[Number] | None = Field(
         default=None,

@@ -7,7 +7,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.schemas import PredictionRequest, to_scene
+from app.schemas.shape import ControlPointsShape
 from dlocore import PRESETS, Box, Cable, Capsule, ControlPoints, Cylinder, Points, Scene, Sphere, Table
+from dlocore.problem.notes import scene_notes
 from tests.app.conftest import contract_scene, paper_scene, put
 
 POINTS = [[0.02, 0.01], [0.3, 0.05], [0.6, 0.02], [0.9, 0.0]]
@@ -59,6 +61,11 @@ def test_the_velocity_of_control_points_is_given_by_control_points() -> None:
         assert isinstance(shape, ControlPoints)
         np.testing.assert_array_equal(shape.velocity, given)
         np.testing.assert_array_equal(shape.strain, [0, 0.001, 0, 0])
+
+
+def test_the_example_of_control_points_starts_without_a_note() -> None:
+    (net,) = ControlPointsShape.model_fields["control_points"].examples or []
+    assert scene_notes(scene_of(paper_scene(shape={"kind": "control_points", "control_points": net}))) == []
 
 
 def test_a_load_is_constant_or_over_time() -> None:
