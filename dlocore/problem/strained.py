@@ -13,5 +13,6 @@ def strain_notes(cable: Cable, strain: float, what: str) -> list[str]:
     solid = cable.axial_stiffness == cable.solid_axial_stiffness  # assumed, or given like that
     if not strain > (RUBBER if solid else STRAINED):
         return []
-    soft = f", with the {cable.axial_stiffness:.3g} N of a solid section of the same EI: give axial_stiffness"
-    return [f"{what} strains the cable by up to {strain:.0%} along itself{soft if solid else ''}"]
+    stiffness = f", with the {cable.axial_stiffness:.3g} N of a solid section of the same EI"
+    soft = f"{stiffness}: give axial_stiffness if it differs" if solid else ""
+    return [f"{what} strains the cable by up to {strain:.0%} along itself{soft}"]
