@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 
 TARGET = 1e-3  # of the length, if no target error is requested
 FITTED = 0.05  # of the target: by how much the spline may miss the rods, which are to agree to the rest
-UNSEEN = "The time ran out before it was known whether the scene determines its motion."
+UNTESTED = "The time ran out before it was known whether the scene determines its motion."
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +238,7 @@ def _status(refined: Refined, fitted: Fit, target: float) -> tuple[Status, str]:
         if refined.estimate + fitted.missed > target:
             missed = f"The spline through them misses them by {in_mm(fitted.missed)}"
             return "max_iterations", f"{agreed} {missed}. Allow a larger target_error, or predict less time."
-        return "converged", agreed + (f" {UNSEEN}" if np.isnan(refined.astray) else "")
+        return "converged", agreed + (f" {UNTESTED}" if np.isnan(refined.astray) else "")
     if refined.ended == "time":
         return "time_limit", f"The time limit passed; {moved}. Allow more time or a larger target_error."
     if refined.ended == "step":
