@@ -62,10 +62,7 @@ class Plane:
 def natural_points(scene: Scene) -> Floats | None:
     """Return the points (n, 3) [m] of a stress-free shape that is given by points, or None."""
     rest = scene.cable.rest_shape
-    if isinstance(rest, str):
-        return None
-    points = cast(Floats, rest)
-    return np.column_stack([points, np.zeros(len(points))]) if points.shape[1] == 2 else points
+    return None if isinstance(rest, str) else cast(Floats, rest)
 
 
 def is_straight(start: StartCurve) -> bool:

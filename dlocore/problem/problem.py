@@ -99,7 +99,7 @@ class Problem:
 
     @property
     def rest_shape(self) -> str | Floats:
-        """The stress-free shape: "straight", "initial" or points (n, 2 or 3) [m]."""
+        """The stress-free shape: "straight", "initial" or points (n, 3) [m]."""
         rest = self.scene.cable.rest_shape
         return "initial" if self.start.bow and isinstance(rest, str) else cast(str | Floats, rest)
 
