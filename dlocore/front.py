@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,29 +21,23 @@ from dlocore.accuracy.fallback import (
     with_finer,
 )
 from dlocore.accuracy.refinement import climb
-from dlocore.answer.contacts import contact_forces, contacts_taken_on, with_contact_errors
-from dlocore.answer.frames import material_of
-from dlocore.answer.parts import Accuracy, ContactForce, GraspReaction, MaterialMotion, OnIteration, StretchMotion
-from dlocore.answer.reactions import Windows, reactions, taken_on, with_reaction_errors
-from dlocore.answer.report import effect_reports, elastic_energy
-from dlocore.answer.stretch import stretch_of
+from dlocore.answer.parts import OnIteration
+from dlocore.assembling import assembled
 from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, flag, instance
 from dlocore.levels.given import evenly_fitted, given_status, march_given
 from dlocore.levels.iterated import ended, out_of_time
 from dlocore.levels.level import Level
-from dlocore.levels.progress import record, record_level, surface_at
-from dlocore.levels.review import neglected, objections
+from dlocore.levels.progress import record, record_level
 from dlocore.levels.whole_march import Outcome, march_status, sided
 from dlocore.prediction import Prediction
-from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.strained import TORN
-from dlocore.problem.time_grid import smallest_n_t
+from dlocore.problem.time_grid import check_n_t
 from dlocore.scene.scene import Method, Quality, Scene
 from dlocore.solvers import paper
 from dlocore.solvers.monitor import Monitor, TimeIsUp, time_allowed
-from dlocore.solvers.spacetime import FindForces, solve
+from dlocore.solvers.spacetime import solve
 
 Floats = NDArray[np.float64]
 
@@ -147,7 +140,7 @@ def _last_resort(found: Prediction, monitor: Monitor) -> Prediction:
     spent = monitor.elapsed()
     level = as_marched(level)
     outcome = _given(level.problem, level.posed.scene.quality, monitor, level)
-    return replace(by_march(_answer(monitor, "march", outcome), tried, spent), scene=scene)
+    return replace(by_march(assembled(monitor, "march", outcome), tried, spent), scene=scene)
 
 
 def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again | None = None) -> Prediction:
@@ -162,9 +155,9 @@ def _solved(problem: Problem, monitor: Monitor, cost: Cost | None, again: Again 
     if method != "march":
         return _least_squares(problem, quality, monitor, method, again)
     if again is not None:
-        return _answer(monitor, method, _as_before(again, monitor), judged=again.judged)
+        return assembled(monitor, method, _as_before(again, monitor), judged=again.judged)
     outcome = climb(problem, quality, monitor, cost) if quality.n_u is None else _given(problem, quality, monitor)
-    return _answer(monitor, method, outcome)
+    return assembled(monitor, method, outcome)
 
 
 def automatic_method(problem: Problem) -> Method:
@@ -182,8 +175,8 @@ def automatic_method(problem: Problem) -> Method:
 def _as_before(again: Again, monitor: Monitor) -> Outcome:
     """Return, as an answer, the march on the grid of a similar prediction, with the error estimate of that one."""
     level = again.level
-    record_level(level.problem, level, monitor)
-    status, message = march_status(level.problem, level)
+    record_level(level, monitor)
+    status, message = march_status(level)
     return Outcome(level, status, message + again.said, again.errors)
 
 
@@ -200,42 +193,36 @@ def _least_squares(
     level = march_given(problem, quality.n_u, quality.n_t, monitor) if again is None else again.level
     problem = level.problem
     if level.motion.stopped or level.motion.largest_strain > TORN:
-        return _answer(monitor, "march", Outcome(level, *march_status(problem, level), None))
+        return assembled(monitor, "march", Outcome(level, *march_status(level), None))
     before = len(monitor.iterations)
     last = [level.control]
 
     def on_step(control: Floats, update: float, residual: float, damping: float = 0.0, length: float = 1.0) -> None:
         last[0] = control
-        record(problem, level, control, update, residual, monitor, damping, length, method)
+        record(
+            level, control, monitor, update=update, residual=residual, note=method, damping=damping, step_length=length
+        )
 
     solver = solve if method == "spacetime" else paper.solve_as_printed
     try:
         solved = solver(problem, level.motion, level.knots_t, quality.threshold, monitor, on_step)
     except TimeIsUp:
         monitor.phase(method)
-        return _answer(monitor, method, out_of_time(level, method, last[0], len(monitor.iterations) - before))
+        return assembled(monitor, method, out_of_time(level, method, last[0], len(monitor.iterations) - before))
     monitor.phase(method)
     end = ended(level, quality, method, solved, len(monitor.iterations) - before, monitor)
     level, method = end.level, end.method
     if again is not None:
         errors = None if again.errors is None else {**again.errors, "iteration": end.left}
         outcome = Outcome(level, end.status, end.message + again.said, errors)
-        return _answer(monitor, method, outcome, end.find_forces, again.judged)
+        return assembled(monitor, method, outcome, end.find_forces, again.judged)
     known = quality.estimate and (method != "paper" or solved.converged)
     compared = by_finer(problem, level, monitor) if known else Compared(None)
     estimate = compared.estimate
     # what the time spline of the march misses is not an error of the least squares
     errors = None if estimate is None else {"grid": max(estimate, level.unseen, level.held_back), "iteration": end.left}
     outcome = Outcome(compared.on(level), end.status, end.message + compared.doubt, errors)
-    return _answer(monitor, method, outcome, end.find_forces)
-
-
-def check_n_t(problem: Problem, n_t: int) -> None:
-    """Raise SceneError if a grid has fewer control points in time than `smallest_n_t`."""
-    least = smallest_n_t(problem)
-    if n_t < least:
-        reason = "Every jump in the grasps' motion needs knots in time"
-        raise SceneError("quality.n_t", n_t, f"at least {least} in this scene", reason)
+    return assembled(monitor, method, outcome, end.find_forces)
 
 
 def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | None = None) -> Outcome:
@@ -246,112 +233,10 @@ def _given(problem: Problem, quality: Quality, monitor: Monitor, level: Level | 
         check_n_t(problem, quality.n_t)
         level = evenly_fitted(march_given(problem, quality.n_u, quality.n_t, monitor))
     problem = level.problem
-    record_level(problem, level, monitor)
+    record_level(level, monitor)
     compared = by_coarser(problem, level, monitor) if quality.estimate else Compared(None)
     level = compared.on(level)
     status, message = given_status(level)
     estimate = compared.estimate
     errors = None if estimate is None else with_untold({"grid": estimate}, level)
     return Outcome(level, status, message + compared.doubt, errors)
-
-
-def _answer(
-    monitor: Monitor,
-    method: str,
-    outcome: Outcome,
-    find_forces: FindForces | None = None,
-    judged: Prediction | None = None,
-) -> Prediction:
-    level = outcome.level
-    problem = level.problem
-    grid = level.motion.grid
-    surface = surface_at(problem, level, level.control)
-    left_out = neglected(level)
-    find_once: FindForces = partial(getattr, level.motion, "forces") if find_forces is None else cache(find_forces)
-    stretch = partial(_stretch, level)
-    material = partial(_material, problem, level)
-    pressing = cache(partial(_pressing, level, find_once, find_forces is None))
-    errors: dict[str, float] = {}
-    if outcome.errors is not None:
-        errors = {**outcome.errors, "neglected": left_out}
-        errors.setdefault("iteration", level.motion.update)
-    return Prediction(
-        scene=problem.scene,
-        status=outcome.status,
-        said=outcome.message,
-        surface=surface,
-        report_grasps=partial(_reactions, level, find_once, judged),
-        report_contacts=partial(_contacts, level, find_once, judged, pressing),
-        report_effects=partial(effect_reports, problem, material, stretch, pressing),
-        report_material=material,
-        report_stretch=stretch,
-        iterations=tuple(monitor.iterations),
-        accuracy=Accuracy(
-            method=method,
-            error_estimate=sum(errors.values()) if errors else None,
-            error_parts=errors,
-            neglected=left_out,
-            wall_time=monitor.elapsed(),
-            n_u=grid.n_u,
-            n_t=len(level.control),
-            delta=problem.scene.quality.threshold,
-            steps=level.motion.steps,
-            dimensions=problem.plane.dimensions,
-            dimensions_reason=problem.plane.reason,
-            phases=dict(monitor.phases),
-        ),
-        find_objections=partial(objections, level),
-        find_start_energy=partial(_start_energy, level),
-        start_fit=problem.start.fit_rms,
-        level=level,
-        judged=judged,
-    )
-
-
-def _reactions(level: Level, find_forces: FindForces, judged: Prediction | None) -> tuple[GraspReaction, ...]:
-    windows = find_forces()
-    found = reactions(level.problem, level.motion.grid, windows)
-    if judged is not None:
-        return taken_on(found, judged.grasps)
-    return with_reaction_errors(found, windows, _beside(level))
-
-
-def _pressing(level: Level, find_forces: FindForces, marched: bool) -> tuple[ContactForce, ...]:
-    return contact_forces(level.marched, level.motion.grid, find_forces(), marched)
-
-
-def _contacts(
-    level: Level, find_forces: FindForces, judged: Prediction | None, pressing: Callable[[], tuple[ContactForce, ...]]
-) -> tuple[ContactForce, ...]:
-    windows, found = find_forces(), pressing()
-    if judged is not None:
-        return contacts_taken_on(found, level.problem.scene, judged.contacts, judged.scene)
-    return with_contact_errors(found, level.marched, windows, _beside(level))
-
-
-def _beside(level: Level) -> list[tuple[Problem, Grid, Windows]]:
-    return [(other.marched, other.motion.grid, other.motion.forces) for other in level.beside]
-
-
-def _start_energy(level: Level) -> float:
-    grid = level.motion.grid
-    return elastic_energy(level.problem, grid, grid.start, grid.history)
-
-
-def _stretch(level: Level) -> StretchMotion:
-    problem, motion = level.problem, level.motion
-    grasps = reactions(problem, motion.grid, motion.forces)
-    return stretch_of(problem, motion.grid, motion.times, motion.states, grasps)
-
-
-def _material(problem: Problem, level: Level) -> MaterialMotion | None:
-    motion = level.motion
-    if len(motion.log) == 0 and not np.any(motion.grid.history.memory) and not problem.rests_as_it_begins:
-        return None
-    kept, memory, axial = motion.logged, motion.memory, motion.axial_memory
-    if len(motion.log) == 0:
-        of_bends = motion.grid.history.memory[:, : 1 if problem.nc == 2 else 3]
-        memory = np.broadcast_to(of_bends, (len(kept), *of_bends.shape))
-    if len(motion.log) == 0 or axial.shape[1] == 0:
-        axial = np.broadcast_to(motion.grid.history.axial[:, 0], (len(kept), len(motion.history.axial)))
-    return material_of(problem, motion.grid, motion.times[kept], motion.states[kept], memory, axial)

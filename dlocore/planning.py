@@ -8,10 +8,11 @@ from dlocore.accuracy.companion import coarser, finer
 from dlocore.answer.parts import EffectReport
 from dlocore.answer.report import planned_effects
 from dlocore.compiling.interrupts import interruptible
-from dlocore.front import automatic_method, check_n_t
+from dlocore.front import automatic_method
 from dlocore.levels.level import Size, given_steps, stretched
 from dlocore.problem.discretisation import smallest_n_u, too_few
 from dlocore.problem.problem import Problem, pose
+from dlocore.problem.time_grid import check_n_t
 from dlocore.scene.scene import Scene
 from dlocore.shape.shape import rest_curve
 from dlocore.solvers import paper

@@ -123,7 +123,7 @@ def compare(prediction: Prediction, scene: Scene, deadline: float) -> dict[str, 
         status, message = given_status(refined)
         if status != "converged":
             return {"reference": f"{status}: {message[:120]}"}
-        found.append(surface_at(refined.problem, refined, refined.control).positions(u, t))
+        found.append(surface_at(refined, refined.control).positions(u, t))
     own = surface.positions(u, t)
     error = float(np.linalg.norm(own - found[1], axis=-1).max()) / length
     apart = float(np.linalg.norm(found[0] - found[1], axis=-1).max()) / length

@@ -90,13 +90,13 @@ def march_again(problem: Problem, like: Prediction, monitor: Monitor) -> Again |
         hardness=hardness(judged.level), grid=grid, knots_t=judged.level.knots_t,
     )  # fmt: skip
     errors = {n: error for n, error in judged.accuracy.error_parts.items() if n not in _NOT_OF_THE_GRID}
-    change = distance(_as_marched(judged), level, problem) if errors else np.inf
+    change = distance(_as_marched(judged), level) if errors else np.inf
     level = replace(level, change=change, turned=judged.level.turned, note="on the grid of a similar motion")
     if level.motion.stopped == "time":
         return Again(level, judged, None)
     length = problem.scene.cable.length
     by_march = like.accuracy.method == "march" and not free_knots
-    status, message = given_status(level) if by_march else march_status(level.problem, level)
+    status, message = given_status(level) if by_march else march_status(level)
     if status != "converged":
         return message
     if errors and not change <= NEAR * length:

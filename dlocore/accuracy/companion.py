@@ -62,9 +62,9 @@ def by_coarser(problem: Problem, level: Level, monitor: Monitor) -> Compared:
         other, said = _marched(problem, size, level, monitor)
         if other is None:
             return Compared(None, said)
-        if march_status(problem, other)[0] == "converged":
+        if march_status(other)[0] == "converged":
             left = _LEFT_KINKED if level.motion.kinked else _LEFT
-            return _compared(left, level, other, problem)
+            return _compared(left, level, other)
     return by_finer(problem, level, monitor)
 
 
@@ -78,13 +78,13 @@ def by_finer(problem: Problem, level: Level, monitor: Monitor) -> Compared:
         return Compared(None, said)
     if other.motion.stopped:
         return Compared(None, f" {UNKNOWN}: the finer march to compare it with found no equilibrium.")
-    return _compared(_SAFETY, level, other, problem)
+    return _compared(_SAFETY, level, other)
 
 
-def _compared(share: float, level: Level, other: Level, problem: Problem) -> Compared:
+def _compared(share: float, level: Level, other: Level) -> Compared:
     """Return the estimate as a share of the distance to another march."""
-    apart = share * distance(level, other, problem)
-    return Compared(apart, turned=turned(level, other, problem), beside=(other,))
+    apart = share * distance(level, other)
+    return Compared(apart, turned=turned(level, other), beside=(other,))
 
 
 def _resized(problem: Problem, size: Size, points: float, steps: float) -> Size:

@@ -154,15 +154,15 @@ class _Climb:
             if self.best is not None:
                 more = self._after_failure(level, self.best, size)
                 if more is not None:
-                    record_level(self.problem, level, self.monitor)
+                    record_level(level, self.monitor)
                     size = more
                     continue
                 if level.motion.stopped and not self.best.motion.stopped:
                     return self._unfinished(level, self.best)
                 self._weigh(level, self.best)
-            record_level(self.problem, level, self.monitor)
+            record_level(level, self.monitor)
             self.best, self.failures = level, self.failures + 1 if level.motion.stopped else 0
-            status, message = march_status(self.problem, level)
+            status, message = march_status(level)
             if level.motion.stopped == "time" or self.failures > len(LEVELS):
                 return Outcome(level, status, message, None)
             self.torn = self.torn + 1 if level.motion.largest_strain > _TEARS else 0
@@ -213,9 +213,9 @@ class _Climb:
             self.problem, size, self.monitor, rho, free_knots=True, rough=True, before=before, whole=before is not None
         )
         if before is not None and level.posed is self.problem:
-            change = distance(before, level, self.problem)
+            change = distance(before, level)
             beside = (before.alone, *(() if self._refined(level, before) == "both" else before.beside[:1]))
-            level = replace(level, change=change, turned=turned(before, level, self.problem), beside=beside)
+            level = replace(level, change=change, turned=turned(before, level), beside=beside)
             if not self._is_rough(level):  # so strands do not meet just because of the grid
                 level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)
         if level.posed is not self.problem:
@@ -288,10 +288,10 @@ class _Climb:
             )  # fmt: skip
         except TimeIsUp:
             return
-        if coarse.posed is not self.problem or march_status(self.problem, coarse)[0] != "converged":
+        if coarse.posed is not self.problem or march_status(coarse)[0] != "converged":
             return
-        moved = distance(coarse, level, self.problem)
-        record_level(self.problem, replace(coarse, change=moved, note="shows the error of the steps"), self.monitor)
+        moved = distance(coarse, level)
+        record_level(replace(coarse, change=moved, note="shows the error of the steps"), self.monitor)
         self.changes.last["time"] = weighed(replace(level, change=moved), coarse, None, True)
         self.estimate = self.changes.estimate(level)
 
@@ -396,13 +396,13 @@ class _Climb:
             )  # fmt: skip
         except TimeIsUp:
             return None
-        away = distance(level, other, self.problem)
-        if other.posed is not self.problem or march_status(self.problem, other)[0] != "converged":
+        if other.posed is not self.problem or march_status(other)[0] != "converged":
             return None
+        away = distance(level, other)
         if not self.estimate + away <= self.target:
             return None
         other = replace(other, change=level.change + away, beside=level.beside, note="watched at more points")
-        record_level(self.problem, other, self.monitor)
+        record_level(other, self.monitor)
         parts = self.changes.parts(other) or {}
         parts[list(parts)[-1]] += away
         return Outcome(other, "converged", self._agreed(other), parts)
@@ -412,7 +412,7 @@ class _Climb:
         allowed = in_ms(self.means.budget)
         if not np.isfinite(level.change):
             return Outcome(level, "time_limit", f"{allowed} allowed only one grid, so its error is not checked.", None)
-        status, failure = march_status(self.problem, level)
+        status, failure = march_status(level)
         moved = f"The best grid in {allowed}; the last refinement moved the surface by {in_mm(level.change)}."
         self._look(level)
         message, parts = self._told(level, moved)
@@ -427,7 +427,7 @@ class _Climb:
         """Return the best march, when a finer grid was not finished."""
         if self.estimate <= self.enough:
             return self._ended()
-        status, message = march_status(self.problem, level)
+        status, message = march_status(level)
         errors = self.changes.parts(best) or ({"grid": best.change} if np.isfinite(best.change) else None)
         return Outcome(best, status, f"A finer grid was not finished: {message}", errors)
 
@@ -444,7 +444,7 @@ class _Climb:
             return Outcome(best, "time_limit", f"{words} Allow more time.", None)
         if self.means.used_up:
             return self._within_budget(best)
-        status, message = march_status(self.problem, best)
+        status, message = march_status(best)
         left = self._left_over()
         if status == "converged" and self._in_all <= self.enough:
             if not self.doubts.start:
@@ -467,7 +467,7 @@ def _is_worse(level: Level, best: Level) -> bool:
     """Tell whether a finer grid failed or strained the cable beyond belief, and the one before far less."""
     torn = level.motion.largest_strain > credible_after(best)
     failed = bool(level.motion.stopped) and not best.motion.stopped
-    stalled = march_status(level.problem, level)[0] != "converged" == march_status(best.problem, best)[0]
+    stalled = march_status(level)[0] != "converged" == march_status(best)[0]
     return torn or failed or stalled
 
 

@@ -27,11 +27,11 @@ def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level
     """
     size = Size(n_u, n_t, given_steps(n_t))
     first = level = march_level(problem, size, monitor)
-    if march_status(level.problem, level)[0] in ("converged", "time_limit"):
+    if march_status(level)[0] in ("converged", "time_limit"):
         return level
     shown = first
     for more, watch in _OTHERWISE:
-        record_level(level.problem, level, monitor)
+        record_level(level, monitor)
         try:
             level = march_level(problem, size._replace(steps=more * size.steps), monitor, watch=watch, whole=True)
         except TimeIsUp:
@@ -48,7 +48,7 @@ def march_given(problem: Problem, n_u: int, n_t: int, monitor: Monitor) -> Level
 
 
 def _said(first: Level, steps: int, watch: bool) -> str:
-    failed = march_status(first.problem, first)[1].split(". ")[0]
+    failed = march_status(first)[1].split(". ")[0]
     stiffer = " Here its length is watched at more points, which makes the cable stiffer on few control points."
     return f" On the grid as given, with {steps} steps: {failed}." + (stiffer if watch else "")
 
@@ -66,7 +66,7 @@ def evenly_fitted(level: Level) -> Level:
 
 def given_status(level: Level) -> tuple[Status, str]:
     """Return the status and the message of a march on a given grid."""
-    status, message = march_status(level.problem, level)
+    status, message = march_status(level)
     if status == "converged" and level.missed > MISSED * level.problem.scene.cable.length:
         spline = f"The time spline of {len(level.control)} control points misses the march by {in_mm(level.missed)}."
         return "max_iterations", f"{message} {spline} Raise n_t."

@@ -371,13 +371,15 @@ def credible_after(level: Level) -> float:
     return max(CREDIBLE_STRAIN, TEARS * level.motion.largest_strain)
 
 
-def distance(a: Level, b: Level, problem: Problem) -> float:
+def distance(a: Level, b: Level) -> float:
     """Return the largest distance between the surfaces of two levels [m], including just after a sudden start.
+
+    They solve the same problem, or that of `a` differs little from that of `b`.
 
     On fine grids it is also sought beside the ends and beside whatever holds, loads or weighs down the cable: a
     stretched cable is worst in the short spans there, which may contain none of the evenly spaced places.
     """
-    dimensions = problem.plane.dimensions
+    problem, dimensions = b.problem, b.problem.plane.dimensions
     most = float(farthest(a.samples, b.samples, dimensions))
     times = np.union1d(a.between, b.between)
     if len(times):
@@ -396,8 +398,7 @@ def _beside(problem: Problem, grid: Grid) -> Floats:
     return breaks[(at[:, None] + np.arange(-2, 3)).clip(0, len(breaks) - 1)].ravel()
 
 
-def turned(a: Level, b: Level, problem: Problem) -> float:
+def turned(a: Level, b: Level) -> float:
     """Return the largest angle between the sections of two levels of a problem [rad]; 0 without twist."""
-    if problem.twist is None:
-        return 0.0
-    return float(np.abs(a.samples[..., 3] - b.samples[..., 3]).max()) / problem.twist.radius
+    twist = b.problem.twist
+    return 0.0 if twist is None else float(np.abs(a.samples[..., 3] - b.samples[..., 3]).max()) / twist.radius

@@ -9,7 +9,6 @@ from dlocore.answer.frames import free_control
 from dlocore.answer.parts import Iteration
 from dlocore.answer.report import elastic_energy, surface_of
 from dlocore.levels.level import Level
-from dlocore.problem.problem import Problem
 from dlocore.solvers.march import STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
@@ -17,27 +16,27 @@ from dlocore.spline import SplineSurface
 Floats = NDArray[np.float64]
 
 
-def record_level(problem: Problem, level: Level, monitor: Monitor) -> None:
+def record_level(level: Level, monitor: Monitor) -> None:
     """Report a level of refinement."""
     motion = level.motion
     note = "march" + (", strongly damped" if motion.rho == STRONGLY_DAMPED else "")
     note += f", {motion.split} steps in smaller ones" if motion.split else ""
     note += f", {level.note}" if level.note else ""
-    record(problem, level, level.control, level.change, motion.update, monitor, 0.0, 1.0, note)
+    record(level, level.control, monitor, update=level.change, residual=motion.update, note=note)
 
 
 def record(
-    problem: Problem,
     level: Level,
     control: Floats,
+    monitor: Monitor,
+    *,
     update: float,
     residual: float,
-    monitor: Monitor,
-    damping: float,
-    step_length: float,
     note: str,
+    damping: float = 0.0,
+    step_length: float = 1.0,
 ) -> None:
-    """Report an iterate `control` (n_t, n_u, nc)."""
+    """Report an iterate `control` (n_t, n_u, nc) on the grid of a level; the rest is as in `Iteration`."""
     grid = level.motion.grid
     monitor.report(
         Iteration(
@@ -49,16 +48,16 @@ def record(
             step_length=step_length,
             n_u=grid.n_u,
             n_t=len(control),
-            find_surface=partial(surface_at, problem, level, control),
-            find_energy=partial(elastic_energy, problem, grid, control[-1], level.motion.history),
+            find_surface=partial(surface_at, level, control),
+            find_energy=partial(elastic_energy, level.problem, grid, control[-1], level.motion.history),
             note=note,
         )
     )
 
 
-def surface_at(problem: Problem, level: Level, control: Floats) -> SplineSurface:
+def surface_at(level: Level, control: Floats) -> SplineSurface:
     """Return the surface of control points (n_t, n_u, nc) on the knots of a level."""
-    motion, grid = level.motion, level.motion.grid
+    problem, motion, grid = level.problem, level.motion, level.motion.grid
     if problem.twist is not None:
         log = motion.log[:, : len(grid.tables.curvature.w)]  # with memory: copying the frames alone takes longer
         control = free_control(problem, grid, level.knots_t, control, motion.times[motion.logged], log)

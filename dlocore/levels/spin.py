@@ -27,8 +27,10 @@ def bends_sharply(problem: Problem, grid: Grid, states: Floats) -> bool:
     return most * SHARP * problem.scene.cable.diameter > 1.0
 
 
-def spin_forces(problem: Problem, grid: Grid, q: Floats, v: Floats, a: Floats, clamped: float | None = None) -> Floats:
-    """Return the generalised forces (n_u, 3) [N] of the sections' inertia, on the side of M q_ddot in eq. 10.
+def spin_forces(problem: Problem, grid: Grid, q: Floats, v: Floats, a: Floats, clamped: float | None) -> Floats:
+    """Return the generalised forces (n_u, 3) [N] of the sections' inertia.
+
+    They stand on the side of M q_ddot in docs/model.md eq. 10.
 
     Args:
         problem: of a motion in space, without twist.

@@ -8,7 +8,6 @@ from dlocore.answer.parts import Status
 from dlocore.levels.driven import closes_beside, driven, words
 from dlocore.levels.level import (
     CREDIBLE_STRAIN,
-    TOO_DEEP,
     Level,
     Size,
     credible_after,
@@ -19,6 +18,7 @@ from dlocore.levels.level import (
 from dlocore.levels.pressed import pressed_into
 from dlocore.levels.progress import record_level
 from dlocore.levels.review import FAR_MORE, called_for, called_for_by_fine
+from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.strained import FOLDED, STRAINED, TORN
@@ -91,7 +91,7 @@ def march_level(
             new = {} if level.motion.stopped == "time" else called_for(level, fine=not rough)
         if not new:
             return level
-        record_level(problem, replace(level, note=f"calls for {', '.join(new)}"), monitor)
+        record_level(replace(level, note=f"calls for {', '.join(new)}"), monitor)
         called |= new
         problem = pose(problem.scene, called)
 
@@ -109,9 +109,9 @@ def sided(problem: Problem, monitor: Monitor) -> Problem:
     return problem
 
 
-def march_status(problem: Problem, level: Level) -> tuple[Status, str]:
+def march_status(level: Level) -> tuple[Status, str]:
     """Return the status and the message of a march."""
-    motion = level.motion
+    problem, motion = level.problem, level.motion
     if not motion.stopped and motion.largest_strain > TORN:
         strain = f"The motion strains the cable along itself by {motion.largest_strain:.0%}, which no cable can follow."
         advice = "Bring the grasps no farther apart than the length of cable between them, or make the motion slower."

@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dlocore.errors import SceneError
 from dlocore.kernels.basis import graded_knots
 from dlocore.problem.problem import Problem
 from dlocore.scene.paths import Waypoints
@@ -55,6 +56,14 @@ def _waypoints(problem: Problem, n_t: int) -> list[float]:
 def smallest_n_t(problem: Problem) -> int:
     """Return the least number of control points in time with which there is a knot at every event."""
     return max(5, 4 + sum(e.multiplicity for e in problem.events))
+
+
+def check_n_t(problem: Problem, n_t: int) -> None:
+    """Raise SceneError if a grid has fewer control points in time than `smallest_n_t`."""
+    least = smallest_n_t(problem)
+    if n_t < least:
+        reason = "Every jump in the grasps' motion needs knots in time"
+        raise SceneError("quality.n_t", n_t, f"at least {least} in this scene", reason)
 
 
 def marks_of(problem: Problem) -> list[float]:

@@ -11,8 +11,8 @@ LAYERS = {
     "dlocore": [
         "errors", "words", "machine", "files", "array_files", "pickling", "compiling", "effects", "kernels", "spline",
         "scene", "shape", "problem", "answer", "solvers", "stability", "statics", "levels", "balance", "prediction",
-        "accuracy", "reference", "front", "many", "planning", "sensitivity", "warming", "calibration", "study",
-        "recordings", "identify",
+        "accuracy", "assembling", "reference", "front", "many", "planning", "sensitivity", "warming", "calibration",
+        "study", "recordings", "identify",
     ],
     "app": [
         "settings", "logs", "solids", "instants", "schemas", "archive", "pages", "http", "recording", "reports",

@@ -171,7 +171,7 @@ def test_strands_that_strike_do_so_alike_on_every_grid() -> None:
     problem = pose(scene, {"self_contact": "its strands meet"})
     levels = [run_level(problem, n_u, 120, 2560, Monitor()) for n_u in (96, 144, 216)]
     assert all(not level.motion.stopped and level.motion.deepest > 0.0 for level in levels)
-    first, second = (distance(a, b, problem) for a, b in pairwise(levels))
+    first, second = (distance(a, b) for a, b in pairwise(levels))
     assert second < 0.6 * first  # 1/1.5^2 and less
     assert second < 0.005 * scene.cable.length
 

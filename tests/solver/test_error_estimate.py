@@ -40,12 +40,12 @@ def marched(n_u: int, steps: int, **options: float) -> Level:
 
 
 def told(level: Level, before: Level, last: Change | None = None) -> Change:
-    return weighed(replace(level, change=distance(level, before, level.problem)), before, last)
+    return weighed(replace(level, change=distance(level, before)), before, last)
 
 
 def test_twice_the_steps_tell_the_error_that_they_leave():
     coarse, fine, truth = (marched(17, steps) for steps in (64, 128, 2048))
-    left = distance(fine, truth, fine.problem)
+    left = distance(fine, truth)
     # a third of the change in theory, as the errors are of second order; 0.45 is counted
     assert left < told(fine, coarse).error < 2.0 * left
 
@@ -59,7 +59,7 @@ def test_what_a_refinement_in_time_tells_is_much_the_same_however_fine_it_is(ste
 
 def test_what_twice_the_steps_move_counts_as_it_is():
     fine, coarse = marched(13, 128), marched(13, 64)
-    assert told(fine, coarse).moved == distance(fine, coarse, fine.problem)
+    assert told(fine, coarse).moved == distance(fine, coarse)
 
 
 def test_strongly_damped_steps_leave_a_larger_share_of_a_change():
@@ -158,7 +158,7 @@ def test_a_coarser_march_that_folds_is_replaced_by_a_finer_one():
     assert "folded" in predict(replace(random_scene(51), quality=march(size.n_u, size.n_t))).message
     other = run_level(level.problem, *finer(level.problem, level.size), Monitor())
     found = estimated(9, 13).accuracy.error_parts["grid"]
-    assert found == pytest.approx(1.5 * distance(level, other, level.problem), rel=1e-9)  # the same two marches
+    assert found == pytest.approx(1.5 * distance(level, other), rel=1e-9)  # the same two marches
 
 
 def test_grids_that_agree_by_chance_on_a_cable_that_yields_are_not_believed():

@@ -39,8 +39,8 @@ def test_what_a_second_of_a_long_motion_brings_is_seen() -> None:
     problem = pose(scene)
     a, b = (march_level(problem, stretched(problem, number), Monitor(), free_knots=True) for number in (0, 1))
     u, t = np.linspace(0.0, 1.0, 33), np.linspace(0.0, 2.0, 401)
-    first, second = (surface_at(level.problem, level, level.control).positions(u, t) for level in (a, b))
-    assert distance(a, b, problem) > 0.5 * np.linalg.norm(first - second, axis=-1).max()
+    first, second = (surface_at(level, level.control).positions(u, t) for level in (a, b))
+    assert distance(a, b) > 0.5 * np.linalg.norm(first - second, axis=-1).max()
 
 
 def test_curvature_is_that_of_a_circle_and_none_where_the_surface_stands_in_one_point():

@@ -281,7 +281,7 @@ def test_how_a_wire_turns_over_on_a_table_does_not_hang_on_the_stiffness_of_cont
     softer, harder = (
         run_level(stiffer(level.posed, ratio), *level.size, Monitor(), free_knots=True) for ratio in (1.0, 100.0)
     )
-    assert distance(softer, harder, level.problem) < 1e-3  # it was 0.022
+    assert distance(softer, harder) < 1e-3  # it was 0.022
 
 
 def test_the_stiffness_is_the_tangent_of_the_forces_in_space() -> None:
