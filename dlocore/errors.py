@@ -128,11 +128,12 @@ def number(
     return x
 
 
-def whole(field: str, value: Any, *, at_least: int, at_most: int) -> int:
+def whole(field: str, value: Any, *, at_least: int, at_most: int | None = None) -> int:
     """Return `value` as an int, or raise SceneError unless it is an integer in the allowed range."""
     integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not integer or not at_least <= value <= at_most:
-        raise SceneError(field, _typed(value), f"an integer, {at_least} to {at_most}")
+    if not integer or value < at_least or (at_most is not None and value > at_most):
+        allowed = f"at least {at_least}" if at_most is None else f"{at_least} to {at_most}"
+        raise SceneError(field, _typed(value), f"an integer, {allowed}")
     return int(value)
 
 

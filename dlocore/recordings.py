@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.array_files import ArrayFile
-from dlocore.errors import MILLIMETRES, SceneError, array, instances, number, repeated, unmasked, within
+from dlocore.errors import MILLIMETRES, SceneError, array, instances, number, repeated, unmasked, whole, within
 from dlocore.pickling import Checked
 from dlocore.scene.cable import PointMass
 from dlocore.words import counted
@@ -356,9 +356,8 @@ def _from_csv(path: Path) -> Recording:
         allowed = "a .json of the same name with the facts of the recording"
         raise SceneError(path.name, f"no {beside.name} in the same folder", allowed)
     facts = read_facts(beside)
-    dimensions = facts.pop("dimensions", 3)
-    if type(dimensions) is not int or dimensions not in (2, 3):
-        raise SceneError(f"recordings[{path.name!r}].dimensions", repr(dimensions), "2 or 3")
+    named = f"recordings[{path.name!r}].dimensions"
+    dimensions = whole(named, facts.pop("dimensions", 3), at_least=2, at_most=3)
     if rows and not any(_is_number(cell) for cell in rows[0][1]):
         rows = rows[1:]
     width = len(rows[0][1]) if rows else 0

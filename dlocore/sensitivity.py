@@ -27,6 +27,7 @@ from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import SceneError, instance, instances
 from dlocore.kernels.sensitivity import factor_steps, follow_steps
 from dlocore.kernels.timefit import fit_time
+from dlocore.levels.level import stiffened
 from dlocore.prediction import Prediction
 from dlocore.problem.discretisation import applied_forces, applied_in_steps
 from dlocore.problem.events import closed_grasps
@@ -359,10 +360,7 @@ def _solved(prediction: Prediction, monitor: Monitor) -> tuple[Problem, March]:
 
 def _hardness(prediction: Prediction) -> float:
     """Return the factor by which contact had to be stiffer in the solve than posed."""
-    if prediction.level is None:
-        return 1.0
-    posed, solved = (x.self_contact or x.contact for x in (prediction.level.posed, prediction.level.problem))
-    return 1.0 if posed is None or solved is None else solved.stiffness / posed.stiffness
+    return 1.0 if prediction.level is None else stiffened(prediction.level)
 
 
 def _moved(knots_t: Floats, problem: Problem, other: Problem) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.array_files import ArrayFile
-from dlocore.errors import SceneError, number, within
+from dlocore.errors import SceneError, number, whole, within
 from dlocore.recordings import Recording, read_facts
 
 Floats = NDArray[np.float64]
@@ -57,8 +57,7 @@ def load_datasets(paths: list[Path], fit: int = FIT) -> tuple[list[MovedCable], 
         SceneError: a file is damaged, a given file is not of a known set, or nothing is there.
         OSError: a file can't be read.
     """
-    if type(fit) is not int or fit < 1:
-        raise SceneError("fit", fit, "an integer, at least 1")
+    fit = whole("fit", fit, at_least=1)
     for path in paths:
         if not path.exists():
             raise SceneError("dataset", str(path), "a file or a folder that exists")

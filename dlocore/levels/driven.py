@@ -13,12 +13,11 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import APART
 from dlocore.problem.brought import GRASP_TOLERANCE
 from dlocore.problem.checks import TOO_DEEP
+from dlocore.problem.depths import depths_by_name
 from dlocore.problem.problem import Problem
-from dlocore.problem.standing import obstacle_rows
 from dlocore.scene.paths import Waypoints, held_at
 from dlocore.scene.scene import Grasp, Scene
 from dlocore.solvers.march import March
@@ -118,18 +117,12 @@ def _held(scene: Scene, grasps: list[Grasp]) -> Floats:
 
 def _into_surroundings(problem: Problem, begins: list[Floats | None]) -> Iterator[Driven]:
     """Yield how deep each grasp that closes late goes into each obstacle, and into the table."""
-    scene, radius = problem.scene, 0.5 * problem.scene.cable.diameter
-    names = [f"obstacles[{scene.environment.obstacles.index(o)}]" for o in problem.obstacles]
-    rows = obstacle_rows(scene, problem.obstacles)
-    table = scene.environment.table if problem.table is not None else None
-    for k, (grasp, begin) in enumerate(zip(scene.grasps, begins, strict=True)):
-        t = _held(scene, [grasp])
+    for k, (grasp, begin) in enumerate(zip(problem.scene.grasps, begins, strict=True)):
+        t = _held(problem.scene, [grasp])
         if grasp.start == 0.0 or begin is None or not len(t):
             continue
         path = np.ascontiguousarray(held_at(grasp.path, t - grasp.start, begin))
-        depths = list(radius - distances(rows, path).T) if names else []
-        depths += [] if table is None else [table.height - path[:, 2]]
-        for name, depth in zip([*names, "the table"], depths, strict=False):
+        for name, depth in depths_by_name(problem, path).items():
             deepest = int(np.argmax(depth))
             yield Driven(k, name, float(t[deepest]), float(depth[deepest]))
 

@@ -354,16 +354,19 @@ def _march(
     return problem, march(problem, grid, steps, monitor, rho=rho, whole=whole), damped
 
 
+def stiffened(level: Level) -> float:
+    """Return how many times stiffer than posed contact was in the march of a level: 1 or more."""
+    posed, solved = (p.self_contact or p.contact for p in (level.posed, level.problem))
+    return 1.0 if posed is None or solved is None else solved.stiffness / posed.stiffness
+
+
 def hardness(level: Level) -> float:
     """Return how many times stiffer than posed contact may have to be on the grid after a level: 1 or more.
 
     It is the factor that the level needed, but no more than leaves half of the depth that is allowed.
     """
-    posed, solved = (p.self_contact or p.contact for p in (level.posed, level.problem))
-    if posed is None or solved is None:
-        return 1.0
     allowed = DEEPEST * level.problem.scene.cable.diameter
-    return max(1.0, solved.stiffness / posed.stiffness * min(1.0, 2.0 * level.motion.deepest / allowed))
+    return max(1.0, stiffened(level) * min(1.0, 2.0 * level.motion.deepest / allowed))
 
 
 def credible_after(level: Level) -> float:

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.effects.distance import distances
 from dlocore.effects.selfcontact import APART
+from dlocore.problem.depths import depths_by_name
 from dlocore.problem.problem import Problem
-from dlocore.problem.standing import obstacle_rows
 from dlocore.problem.strands import nearest_strands
 from dlocore.solvers.march import March
 from dlocore.spline import design_matrix
@@ -31,16 +30,9 @@ def _into_surroundings(problem: Problem, motion: March) -> Iterator[tuple[float,
     """Yield how deep the cable is in each obstacle and in the table, at most [m], and the words for it."""
     if problem.contact is None:
         return
-    scene, u = problem.scene, np.unique(motion.grid.tables.contact.u)
-    names = [f"obstacles[{scene.environment.obstacles.index(o)}]" for o in problem.obstacles]
-    rows = obstacle_rows(scene, problem.obstacles)
-    table = scene.environment.table if problem.table is not None else None
-    states = np.arange(motion.reached + 1)
+    u, states = np.unique(motion.grid.tables.contact.u), np.arange(motion.reached + 1)
     for some in np.array_split(states, -(-len(states) * len(u) // _AT_ONCE)):
-        points = _places(problem, motion, u, some)
-        depths = [0.5 * scene.cable.diameter - distances(rows, points).T] if names else []
-        depths += [] if table is None else [(table.height - points[:, 2])[None]]
-        for name, depth in zip([*names, "the table"], np.concatenate(depths), strict=False):
+        for name, depth in depths_by_name(problem, _places(problem, motion, u, some)).items():
             k, i = divmod(int(np.argmax(depth)), len(u))
             yield float(depth.max()), f"{name}, at u = {u[i]:.4g} m and {motion.times[some[k]]:.3g} s"
 

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from dlocore.errors import SceneError, calculable, points_array
 from dlocore.scene.scene import Points
-from dlocore.shape.fit import MAX_SPANS, NOISE, check_length, fit_points
-from dlocore.shape.ordering import DEVIATIONS, Indices, Order, order_points, without_spikes
+from dlocore.shape.fit import MAX_SPANS, NOISE, check_length, fit_points, way_along
+from dlocore.shape.ordering import Indices, Order, cutoff, order_points, without_spikes
 from dlocore.shape.shape import StartCurve, start_curve
 from dlocore.shape.smoothing import smooth
 from dlocore.spline import DEGREE
@@ -92,7 +92,7 @@ def _fitted(p: Floats, ordered: bool, length: float | None, start: Floats | None
                 check_length("points", "points along the whole cable", measured, length, "length")
             raise no_curve from None
         off = _off(curve, p[kept])
-        bad = off > max(DEVIATIONS * float(np.median(off)) / 0.6745, NOISE)
+        bad = off > cutoff(off, floor=NOISE)
         if not remove_outliers or not bad.any():
             break
         kept = kept[~bad]
@@ -125,7 +125,7 @@ def _measured(p: Floats) -> float:
     fit in its arclength the final one.
     """
     middle = p - p.mean(axis=0)
-    s = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))])
+    s = way_along(p)
     if not s[-1] > 0:
         raise SceneError("points", "points all in one place", "points along a curve")
     spans = int(np.clip(len(p), 8, MAX_SPANS))

@@ -114,7 +114,7 @@ def _fit(coordinates: bytes, length: float) -> PointFit:
     p, progress, weight = _averaged(distinct, share)
     noise = _noise(p) if len(p) > SPARSE else 0.0
     most_noise = max(NOISE * max(length, 1.0), 1.5 * noise)
-    chords = _cumulated(p)
+    chords = way_along(p)
     spans, most_missed = 2 * int(np.clip(len(p), MIN_SPANS, MAX_SPANS)), np.inf
     while spans > MIN_SPANS:
         spans = max(spans // 2, MIN_SPANS)
@@ -212,11 +212,12 @@ def _distinct(p: Floats, distance: float) -> tuple[Floats, NDArray[np.intp]]:
 
 def _share(p: Floats) -> Floats:
     """Return the progress along the points (n,), from 0 to 1: the mean of that by number and that by chord length."""
-    chord = _cumulated(p)
+    chord = way_along(p)
     return 0.5 * (np.arange(len(p)) / (len(p) - 1) + chord / chord[-1])
 
 
-def _cumulated(p: Floats) -> Floats:
+def way_along(p: Floats) -> Floats:
+    """Return the length of the chords from the first of the points (n, 3) up to each of them (n,) [m]."""
     return np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))])
 
 

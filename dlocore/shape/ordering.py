@@ -60,7 +60,7 @@ def order_points(points: Floats, start: Floats | None = None) -> Order:
     inside = _in_company(points)
     path = _backbone(points[inside])
     at, distance = _project(points[inside], path)
-    near = distance <= _cutoff(distance, floor=0.25 * float(np.median(_steps(path))))
+    near = distance <= cutoff(distance, floor=0.25 * float(np.median(_steps(path))))
     order = inside[near][np.argsort(at[near], kind="stable")]
     first, last = points[order[0]], points[order[-1]]
     if tuple(last) < tuple(first) if start is None else ((last - start) ** 2).sum() < ((first - start) ** 2).sum():
@@ -76,7 +76,7 @@ def without_spikes(points: Floats) -> Order:
     kept = np.arange(len(points))
     while len(kept) > 4:
         off, detour = _off_line(points[kept])
-        bad = (off > _cutoff(off, floor=0.0)) & (detour > SPIKE) & (off > 2 * np.median(_steps(points[kept])))
+        bad = (off > cutoff(off, floor=0.0)) & (detour > SPIKE) & (off > 2 * np.median(_steps(points[kept])))
         if not bad.any():
             break
         kept = np.delete(kept, np.argmax(np.where(bad, off, 0.0)))
@@ -99,7 +99,7 @@ def _steps(p: Floats) -> Floats:
     return np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1))
 
 
-def _cutoff(distance: Floats, floor: float) -> float:
+def cutoff(distance: Floats, floor: float) -> float:
     """Return the distance beyond which a point is an outlier [m]; the median of the half-normal is 0.67 sigma."""
     return max(DEVIATIONS * float(np.median(distance)) / 0.6745, floor)
 
