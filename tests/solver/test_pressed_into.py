@@ -30,7 +30,7 @@ def test_a_cable_that_is_pulled_taut_around_a_needle_is_told_where_it_is_pressed
     found = predict(scene)
     assert found.status == "stalled"
     told = re.search(
-        r"pressed \d+% of its diameter into obstacles\[1\], at u = (\S+) m and (\S+) s\. Move it", found.said
+        r"pressed \d+% of its diameter into obstacles\[1\], at u = (\S+) m and (\S+) s\. Press it in less", found.said
     )
     assert told is not None, found.said
     assert float(told[1]) == pytest.approx(0.5, abs=0.01)
