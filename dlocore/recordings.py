@@ -46,6 +46,11 @@ class Hold:
     towards: int | None = None
     forward: bool = True
 
+    def along(self, marker: Floats, towards: Floats) -> Floats:
+        """Return the unit directions of larger u (k, 3) from the positions (k, 3) [m] of `marker` and `towards`."""
+        way = (towards - marker) * (1.0 if self.forward else -1.0)
+        return np.asarray(way / np.linalg.norm(way, axis=1)[:, None])
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording(Checked):

@@ -137,8 +137,7 @@ class Replay:
 
     @staticmethod
     def _directions(h: Hold, clean: dict[int, CubicSpline], t: Floats) -> Floats:
-        along = (clean[cast(int, h.towards)](t) - clean[h.marker](t)) * (1.0 if h.forward else -1.0)
-        return np.asarray(along / np.linalg.norm(along, axis=1)[:, None])
+        return h.along(clean[h.marker](t), clean[cast(int, h.towards)](t))
 
     def _path(self, h: Hold, clean: dict[int, CubicSpline]) -> _Path:
         t = self.begin + self.step_times
@@ -326,11 +325,8 @@ def common_references(recordings: Sequence[Recording]) -> Floats | None:
     for h in recordings[0].holds:
         if h.towards is None:
             continue
-        sign = 1.0 if h.forward else -1.0
-        along = [
-            sign * (cast(Floats, r.markers)[:, h.towards] - cast(Floats, r.markers)[:, h.marker]) for r in recordings
-        ]
-        unit = [x / np.linalg.norm(x, axis=1)[:, None] for x in along]
-        mean = np.nanmean(np.concatenate(unit), axis=0)
+        tracks = [cast(Floats, r.markers) for r in recordings]
+        directions = [h.along(at[:, h.marker], at[:, h.towards]) for at in tracks]
+        mean = np.nanmean(np.concatenate(directions), axis=0)
         found.append(mean / np.linalg.norm(mean))
     return np.array(found).reshape(-1, 3)

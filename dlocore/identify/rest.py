@@ -54,11 +54,8 @@ class Rest:
 
     def _directions(self) -> Floats:
         """Return the unit directions of the clamps (frames, clamps, 3)."""
-        found = []
-        for h in self.holds:
-            if h.towards is not None:
-                along = (self.markers[:, h.towards] - self.markers[:, h.marker]) * (1.0 if h.forward else -1.0)
-                found.append(along / np.linalg.norm(along, axis=1)[:, None])
+        at = self.markers
+        found = [h.along(at[:, h.marker], at[:, h.towards]) for h in self.holds if h.towards is not None]
         return np.stack(found, axis=1) if found else np.zeros((len(self.markers), 0, 3))
 
     def play(self, candidate: Candidate) -> Settled:

@@ -74,6 +74,12 @@ def test_close_held_neighbours_are_a_clamp_whose_inner_marker_is_held() -> None:
     assert found == (Hold(1, 0, False), Hold(5, 6, True))
 
 
+@pytest.mark.parametrize(("hold", "x"), [(Hold(1, 0, False), (0.3, 0.1)), (Hold(5, 6, True), (0.7, 0.9))])
+def test_the_direction_of_a_clamp_is_that_of_larger_u(hold: Hold, x: tuple[float, float]) -> None:
+    marker, towards = (np.array([[at, 0.0, 0.0], [0.0, at, 0.0]]) for at in x)
+    np.testing.assert_array_equal(hold.along(marker, towards), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
 def test_far_held_neighbours_are_two_grippers() -> None:
     assert recording(held=(0, 1)).holds == (Hold(0), Hold(1))
 
