@@ -28,6 +28,7 @@ from dlocore.errors import Cancelled
 from dlocore.levels.whole_march import sided
 from dlocore.problem.problem import pose
 from dlocore.reference import refine
+from dlocore.reference.compile import _FILES
 from dlocore.reference.fit import fit
 from dlocore.reference.motion import Motion, Watch
 from dlocore.reference.refine import left
@@ -59,23 +60,36 @@ DECISIONS = {
     "statics.tipping.tip_notes", "stability.determined.DISTURBED", "stability.determined.UNDETERMINED",
     "stability.determined.farther", "stability.determined.in_words",
 }  # fmt: skip
+PACKAGE = Path(dlocore.reference.__file__).parent
 
 
 def target(error):
     return replace(SCENE, quality=Quality(method="reference", target_error=error))
 
 
+def imported(path: Path) -> set[str]:
+    """Return the names of all that a file imports from the package: modules, and what is in them."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return {name.removeprefix("dlocore.") for name in found if name.startswith("dlocore.")}
+
+
 def test_it_shares_no_solver_code_with_what_it_judges():
-    package, taken = Path(dlocore.reference.__file__).parent, set()
-    for path in package.glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Import):
-                taken |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                taken |= {f"{node.module}.{alias.name}" for alias in node.names}
-    taken = {name.removeprefix("dlocore.") for name in taken if name.startswith("dlocore.")}
-    taken = {name for name in taken if not f"{name}.".startswith((*DATA, "reference."))}
-    assert taken == DECISIONS
+    taken = {name for path in PACKAGE.glob("*.py") for name in imported(path)}
+    assert {name for name in taken if not f"{name}.".startswith((*DATA, "reference."))} == DECISIONS
+
+
+def test_the_cache_depends_on_every_file_that_is_compiled_or_read_by_compiled_code():
+    within = {
+        path.stem: [n.split(".")[1] for n in imported(path) if n.startswith("reference.")]
+        for path in PACKAGE.glob("*.py")
+    }
+    compiled = {file for file, read in within.items() if "compile" in read}
+    assert compiled | {read for file in compiled for read in within[file]} == set(_FILES)
 
 
 def test_the_estimate_bounds_the_error_and_the_target_is_met():
