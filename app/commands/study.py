@@ -25,7 +25,7 @@ def study(options: argparse.Namespace) -> int:
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads of a linear algebra library would blur the times
     from dlocore.study import record
     from dlocore.study.compare import compare, words
-    from dlocore.study.plan import Plan
+    from dlocore.study.plan import StudyPlan
     from dlocore.study.running import run_study
 
     read = [*options.scenes, *([] if options.compare is None else [options.compare])]
@@ -34,7 +34,7 @@ def study(options: argparse.Namespace) -> int:
     if options.plots is not None:
         _check_matplotlib()
     try:
-        plan = Plan(**_asked(options))
+        plan = StudyPlan(**_asked(options))
     except SceneError as error:
         raise CommandError(_words(error, options)) from None
     if options.plots is not None:

@@ -24,7 +24,7 @@ from app.store.studies import StudyStore
 from dlocore import Scene
 from dlocore.errors import within
 from dlocore.scene.scene import Switch
-from dlocore.study.plan import Plan
+from dlocore.study.plan import StudyPlan
 from dlocore.study.record import to_document
 from dlocore.study.running import run_study
 
@@ -71,7 +71,7 @@ async def study(
     return response
 
 
-def _plan(wanted: StudyRequest, service: Service) -> Plan:
+def _plan(wanted: StudyRequest, service: Service) -> StudyPlan:
     asked: dict[str, Any] = {
         "grids": tuple((grid.n_u, grid.n_t) for grid in wanted.grids),
         "methods": tuple(wanted.methods),
@@ -92,7 +92,7 @@ def _plan(wanted: StudyRequest, service: Service) -> Plan:
             name: cast(dict[str, Switch], switches.model_dump(exclude_unset=True))
             for name, switches in wanted.effects.items()
         }
-    return Plan(**asked)
+    return StudyPlan(**asked)
 
 
 @router.get("", response_model=StudyList, summary="List the studies", responses=described.failures(401, 406))

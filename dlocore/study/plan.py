@@ -27,7 +27,7 @@ class Case(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class StudyPlan:
     """Scenes over grids, thresholds, methods and sets of effects.
 
     Args:

@@ -13,7 +13,7 @@ from dlocore.machine import machine
 from dlocore.prediction import Prediction
 from dlocore.scene.scene import Scene
 from dlocore.study.judge import Truth, finest_march, positions_of, step_by_step
-from dlocore.study.plan import Case, Plan
+from dlocore.study.plan import Case, StudyPlan
 from dlocore.study.record import EffectCost, Run, Scaled, Step, Study
 from dlocore.study.scaling import effect_pairs, sizes
 from dlocore.study.timing import Times, timed
@@ -26,7 +26,7 @@ _TRUTH_PATIENCE = 10.0  # [s] for the marches that make a truth, before the last
 
 
 def run_study(
-    plan: Plan,
+    plan: StudyPlan,
     *,
     on_progress: OnProgress = lambda done, total, what: None,
     cancelled: Callable[[], bool] = lambda: False,
@@ -70,7 +70,7 @@ class _Measuring:
     """The progress of one study, and what was refused."""
 
     def __init__(
-        self, plan: Plan, on_progress: OnProgress, cancelled: Callable[[], bool], deadline: float | None
+        self, plan: StudyPlan, on_progress: OnProgress, cancelled: Callable[[], bool], deadline: float | None
     ) -> None:
         self._plan = plan
         self._on_progress = on_progress

@@ -10,7 +10,7 @@ from benchmarks.hard.generator import draw
 from benchmarks.hard.judge import by_a_march, run
 from dlocore import Cable, Grasp, Iteration, Move, Prediction, Quality, Scene, Straight, predict
 from dlocore.accuracy.refinement import AUTO_ENOUGH
-from dlocore.study.plan import Plan
+from dlocore.study.plan import StudyPlan
 from dlocore.study.running import run_study
 from tests.solver.scenes import jerked
 
@@ -140,7 +140,9 @@ def test_a_motion_like_it_goes_on_by_the_march(given: Scene, left: bool):
 
 
 def test_a_study_books_no_march_as_a_least_squares(asked: Scene):
-    plan = Plan(scenes={"jerked": asked}, grids=((17, 41),), methods=("spacetime",), deltas=(1e-9,), parts=("runs",))
+    plan = StudyPlan(
+        scenes={"jerked": asked}, grids=((17, 41),), methods=("spacetime",), deltas=(1e-9,), parts=("runs",)
+    )
     (run,) = run_study(plan).runs
     assert (run.method, run.status) == ("spacetime", "max_iterations")
 

@@ -12,7 +12,7 @@ from dlocore import Cancelled, Quality, SceneError, predict
 from dlocore.study import record, running
 from dlocore.study.compare import compare, words
 from dlocore.study.judge import finest_march, largest_error, step_by_step
-from dlocore.study.plan import Plan
+from dlocore.study.plan import StudyPlan
 from dlocore.study.record import EffectCost, Scaled, Study
 from dlocore.study.running import run_study
 from dlocore.study.scaling import effect_pairs, sizes
@@ -28,7 +28,7 @@ def measured() -> Study:
     scenes = {"at the end": paper_case(0.0), "at a quarter": paper_case(0.25)}
     sets = {"auto": {}, "no drag": {"drag": "off"}}
     return run_study(
-        Plan(scenes=scenes, grids=GRIDS, deltas=(1e-3, 1e-6), effects=sets, repeats=2, parts=("runs",))  # type: ignore[arg-type]
+        StudyPlan(scenes=scenes, grids=GRIDS, deltas=(1e-3, 1e-6), effects=sets, repeats=2, parts=("runs",))  # type: ignore[arg-type]
     )
 
 
@@ -189,7 +189,9 @@ def test_a_grid_without_room_is_noted_and_the_rest_is_measured() -> None:
     grasps = paper_case(0.25).grasps
     crowded = replace(paper_case(0.25), grasps=tuple(replace(grasps[0], u=u) for u in (0.2, 0.3, 0.4, 0.5, 0.6)))
     study = run_study(
-        Plan(scenes={"crowded": crowded}, grids=((7, 13), (17, 25)), methods=("march",), repeats=1, parts=("runs",))
+        StudyPlan(
+            scenes={"crowded": crowded}, grids=((7, 13), (17, 25)), methods=("march",), repeats=1, parts=("runs",)
+        )
     )
     assert [(run.n_u, run.n_t) for run in study.runs] == [(17, 25)]
     assert len(study.refused) == 1
@@ -218,7 +220,7 @@ def test_a_grid_without_room_is_noted_and_the_rest_is_measured() -> None:
 )
 def test_what_is_not_allowed_is_named(asked: dict[str, object], field: str) -> None:
     with pytest.raises(SceneError) as caught:
-        Plan(**asked)  # type: ignore[arg-type]
+        StudyPlan(**asked)  # type: ignore[arg-type]
     assert caught.value.field == field
 
 
@@ -226,7 +228,7 @@ def test_a_study_stops_when_asked() -> None:
     news: list[int] = []
     with pytest.raises(Cancelled):
         run_study(
-            Plan(parts=("runs",)),
+            StudyPlan(parts=("runs",)),
             on_progress=lambda done, total, what: news.append(done),
             cancelled=lambda: len(news) >= 2,
         )
@@ -271,7 +273,7 @@ def test_a_size_whose_time_is_drowned_by_noise_is_told_of(monkeypatch: pytest.Mo
     times = iter([2e-3, 2e-3, 1.9e-3, 4e-3])  # the marches, then the solves that begin with them
     solved = SimpleNamespace(iterations=[None, None])
     monkeypatch.setattr(running._Measuring, "_solved", lambda *_: (solved, Times(next(times), 1e-5, 5)))
-    found = run_study(Plan(parts=("scaling",)))
+    found = run_study(StudyPlan(parts=("scaling",)))
     assert [(row.method, row.value) for row in found.scaling] == [("march", 9), ("march", 13), ("spacetime", 13)]
     assert found.scaling[-1].wall_time == pytest.approx(1e-3)
     (told,) = found.refused
