@@ -22,9 +22,12 @@ class Parameter:
         name: as in results, e.g. "bending_stiffness" or "rest_curvature[2][0]".
         unit: SI.
         logarithmic: it varies by factors, otherwise by `scale`.
-        scale: [unit] a usual value; the prior's standard deviation for parameters that may have either sign.
+        scale: [unit] a usual value, for parameters that are not logarithmic.
         least: lower bound for parameters that are not logarithmic.
+        prior: standard deviation of its coordinate that is assumed before any recording; infinite if none is.
+        centred: whether the search pulls the coordinate to 0, as the prior says; otherwise the prior only limits steps.
         get, put: read it from a candidate; return a candidate with it.
+        first: [unit] the value to begin with if none is given; None: there always is one.
     """
 
     name: str
@@ -32,8 +35,11 @@ class Parameter:
     logarithmic: bool
     scale: float
     least: float
+    prior: float
+    centred: bool
     get: Callable[[Candidate], float]
     put: Callable[[Candidate, float], Candidate]
+    first: float | None = None
 
     def coordinate(self, value: float) -> float:
         """Return the value on the scale on which it is sought."""
@@ -44,23 +50,62 @@ class Parameter:
         return float(np.exp(coordinate)) if self.logarithmic else coordinate * self.scale
 
 
-SCALARS = (
-    "bending_stiffness",
-    "bending_damping",
-    "drag",
-    "drag_quadratic",
-    "torsional_stiffness",
-    "linear_density",
-    "length_ratio",
-    "turn",
-    "yield_strain",
-)
 DEFAULT = ("bending_stiffness", "drag", "drag_quadratic", "bending_damping")
-_FIRST = {"bending_damping": 1e-4, "drag": 0.05, "drag_quadratic": 0.02, "yield_strain": 0.02}  # if none is given
 _INDEXED = re.compile(r"(rest_curvature|clamp_angles|marker_offsets)\[(\d+)\]\[([01])\]")
 _SEVERAL = {"rest_curvature": ("1/m", 2.0), "clamp_angles": ("rad", 0.2), "marker_offsets": ("m", 0.01)}
 _NEEDED = {"clamp_angles": "where a recording has a clamp", "marker_offsets": "where a recording has free markers"}
+_PRIOR_LOG = 3.0  # standard deviation of the logarithms: a factor of 20 either way is no surprise
 PLACES = 5  # along the cable at which its rest curvature is sought
+
+
+def _of_cable(name: str, unit: str, first: float | None = None, **needs: float) -> Parameter:
+    """Return a field of the cable as a parameter; `needs` are values for other fields, where those are None."""
+
+    def put(c: Candidate, x: float) -> Candidate:
+        missing = {field: value for field, value in needs.items() if getattr(c.cable, field) is None}
+        changes: Any = {name: x, **missing}
+        return replace(c, cable=replace(c.cable, **changes))
+
+    return Parameter(
+        name=name, unit=unit, logarithmic=True, scale=1.0, least=0.0, prior=_PRIOR_LOG, centred=False,
+        get=lambda c: cast(float, getattr(c.cable, name)), put=put, first=first,
+    )  # fmt: skip
+
+
+def _of_environment(name: str, unit: str, scale: float) -> Parameter:
+    """Return a field of the environment as a parameter, which begins with its usual value."""
+
+    def put(c: Candidate, x: float) -> Candidate:
+        changes: Any = {name: x}
+        return replace(c, environment=replace(c.environment, **changes))
+
+    return Parameter(
+        name=name, unit=unit, logarithmic=False, scale=scale, least=0.0, prior=np.inf, centred=False,
+        get=lambda c: cast(float, getattr(c.environment, name)), put=put, first=scale,
+    )  # fmt: skip
+
+
+_SCALARS = {
+    p.name: p
+    for p in (
+        _of_cable("bending_stiffness", "N m^2"),
+        _of_cable("bending_damping", "N m^2 s", first=1e-4),
+        _of_environment("drag", "N s/m^2", 0.05),
+        _of_environment("drag_quadratic", "N s^2/m^3", 0.02),
+        _of_cable("torsional_stiffness", "N m^2"),
+        _of_cable("linear_density", "kg/m"),
+        Parameter(
+            name="length_ratio", unit="", logarithmic=True, scale=1.0, least=0.0, prior=0.01, centred=True,
+            get=lambda c: c.length_ratio, put=lambda c, x: replace(c, length_ratio=x),
+        ),
+        Parameter(
+            name="turn", unit="rad", logarithmic=False, scale=1.0, least=-np.inf, prior=1.0, centred=True,
+            get=lambda c: c.turn, put=lambda c, x: replace(c, turn=x),
+        ),
+        _of_cable("yield_strain", "", first=0.02, memory_rate=100.0),
+    )
+}  # fmt: skip
+SCALARS = tuple(_SCALARS)
 
 
 def parameters(
@@ -91,8 +136,8 @@ def parameters(
             found.append(_component(several, int(match[2]), int(match[3])))
         elif several in there:
             found += [_component(several, i, d) for i in there[several] for d in range(2)]
-        elif name in SCALARS:
-            found.append(_scalar(name))
+        elif name in _SCALARS:
+            found.append(_SCALARS[name])
         else:
             raise SceneError("parameters", name, "one of " + ", ".join([*SCALARS, *_SEVERAL]))
     if len({p.name for p in found}) != len(found):
@@ -111,40 +156,12 @@ def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int, markers:
     if any(n.startswith("marker_offsets") for n in names) and candidate.marker_offsets is None:
         candidate = replace(candidate, marker_offsets=np.zeros((markers, 2)))
     for name in names:
-        if name in _FIRST:
-            parameter = _scalar(name)
-            if not (parameter.get(candidate) or 0.0) > 0.0:
-                candidate = parameter.put(candidate, _FIRST[name])
+        parameter = _SCALARS.get(name)
+        if parameter is not None and parameter.first is not None and not (parameter.get(candidate) or 0.0) > 0.0:
+            candidate = parameter.put(candidate, parameter.first)
     if "turn" in names or "torsional_stiffness" in names or candidate.yields:
         candidate = replace(candidate, twist=True)
     return candidate
-
-
-def _scalar(name: str) -> Parameter:
-    if name in ("drag", "drag_quadratic"):
-        unit, scale = ("N s/m^2", 0.05) if name == "drag" else ("N s^2/m^3", 0.02)
-
-        def put(c: Candidate, x: float) -> Candidate:
-            changes: Any = {name: x}
-            return replace(c, environment=replace(c.environment, **changes))
-
-        return Parameter(name, unit, False, scale, 0.0, lambda c: cast(float, getattr(c.environment, name)), put)
-    if name == "turn":
-        return Parameter(
-            name, "rad", False, 1.0, -np.inf, lambda c: c.turn, lambda c, x: replace(c, turn=x)
-        )  # fmt: skip
-    if name == "length_ratio":
-        return Parameter(name, "", True, 0.01, 0.0, lambda c: c.length_ratio, lambda c, x: replace(c, length_ratio=x))
-    units = {"bending_stiffness": "N m^2", "torsional_stiffness": "N m^2", "bending_damping": "N m^2 s"}
-
-    def put_cable(c: Candidate, x: float) -> Candidate:
-        changes: dict[str, Any] = {name: x}
-        if name == "yield_strain" and c.cable.memory_rate is None:
-            changes["memory_rate"] = 100.0
-        return replace(c, cable=replace(c.cable, **changes))
-
-    unit = units.get(name, "kg/m" if name == "linear_density" else "")
-    return Parameter(name, unit, True, 1.0, 0.0, lambda c: cast(float, getattr(c.cable, name)), put_cable)
 
 
 def _component(name: str, i: int, d: int) -> Parameter:
@@ -157,5 +174,6 @@ def _component(name: str, i: int, d: int) -> Parameter:
         return replace(c, **changes)
 
     return Parameter(
-        f"{name}[{i}][{d}]", unit, False, scale, -np.inf, lambda c: float(getattr(c, name)[i, d]), put
+        name=f"{name}[{i}][{d}]", unit=unit, logarithmic=False, scale=scale, least=-np.inf, prior=1.0, centred=True,
+        get=lambda c: float(getattr(c, name)[i, d]), put=put,
     )  # fmt: skip

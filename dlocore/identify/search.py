@@ -23,7 +23,6 @@ _MARCHED = 2e-2  # the same if it is marched, where the tolerance would hide a s
 _KNEE = 1.5  # robust deviations, above which a residual counts by its size instead of its square
 _LEAST_DEVIATION = 2e-4  # [m] of the residuals; no tracking is better than this
 _MOST_CHANGE = 1.0  # of a coordinate in one iteration
-_PRIOR_LOG = 3.0  # standard deviation of the logarithms: a factor of 20 either way is no surprise
 _HOPED = 1e-2  # expected relative decrease below which a search may end when no step is better
 _CONVERGED = 1e-3  # relative decrease of the cost
 
@@ -224,13 +223,11 @@ class Search:
 
     def prior(self) -> Floats:
         """Return the standard deviation of the prior of each coordinate; infinite if there is none."""
-        return np.array([_PRIOR_LOG if p.logarithmic and p.name != "length_ratio" else 1.0 if not np.isfinite(p.least)
-                         else p.scale if p.name == "length_ratio" else np.inf for p in self.chosen])  # fmt: skip
+        return np.array([p.prior for p in self.chosen])
 
     def _pull(self, x: Floats) -> Floats:
-        """Return the gradient of the prior: angles and bends are about zero; logarithms have none."""
-        centred = np.array([not p.logarithmic or p.name == "length_ratio" for p in self.chosen])
-        return np.where(centred, x / self.prior() ** 2, 0.0)
+        """Return the gradient of the prior, which is zero for parameters that it does not pull."""
+        return np.where([p.centred for p in self.chosen], x / self.prior() ** 2, 0.0)
 
     def cost(self, r: Floats, deviation: float, x: Floats) -> float:
         """Return the robust cost of residuals and prior."""

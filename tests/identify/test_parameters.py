@@ -6,7 +6,7 @@ import pytest
 from app.commands.command_line import parser
 from dlocore import Cable, Environment, SceneError
 from dlocore.identify import Candidate
-from dlocore.identify.parameters import SCALARS, parameters, prepared
+from dlocore.identify.parameters import DEFAULT, SCALARS, parameters, prepared
 
 FREE = (2, 3, 4)
 
@@ -58,5 +58,6 @@ def test_the_help_of_the_command_names_every_parameter(capsys: pytest.CaptureFix
     with pytest.raises(SystemExit):
         parser().parse_args(["identify", "--help"])
     told = "".join(capsys.readouterr().out.split())
+    assert f"(default:{','.join(DEFAULT[:-1])}and{DEFAULT[-1]})" in told
     for name in (*SCALARS, "clamp_angles", "marker_offsets", "rest_curvature"):
         assert name in told, name
