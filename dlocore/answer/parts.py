@@ -151,11 +151,12 @@ class MaterialMotion(Answered):
 
     Attributes:
         times: (m,) [s].
-        director: (m, 3), at u = 0.
-        u: (k,) [m].
-        memory: (m, k, 3) [1/m, 1/m, rad/m].
-        stretch: (m, k).
-        natural: (k, 3) [1/m, 1/m, rad/m].
+        director: unit vectors (m, 3) across the cable at u = 0, fixed in its section where theta is zero.
+        u: material coordinates (k,) [m], rising.
+        memory: stress-free strain (m, k, 3): two curvatures in the sections' frame and the twist rate
+            [1/m, 1/m, rad/m].
+        stretch: stress-free axial strain (m, k), without unit.
+        natural: `memory` before anything yielded (k, 3), towards which hardening pulls back [1/m, 1/m, rad/m].
     """
 
     times: Floats

@@ -171,7 +171,11 @@ class Replay:
         return way, turns[:2]
 
     def scene(self, candidate: Candidate) -> Scene:
-        """Return the scene of the recording for a candidate."""
+        """Return the scene of the recording for a candidate.
+
+        The fit of its start begins with the start that the last call found, so that its last digits depend on the calls
+        before.
+        """
         recording = self.recording
         span = self.span.scaled(candidate.length_ratio)
         cable, length, u = span.of_cable(candidate.cable), span.length, span.u

@@ -189,7 +189,10 @@ class Problem:
 
     @cached_property
     def masses(self) -> Floats:
-        """Material coordinate of each point mass, and the length of cable of equal mass, (k, 2) [m] (eq. 9a)."""
+        """Material coordinate of each point mass, and the length of cable of equal mass, (k, 2) [m].
+
+        See docs/model.md eq. 9a.
+        """
         cable = self.scene.cable
         return np.array([(one.u, one.mass / cable.linear_density) for one in cable.point_masses]).reshape(-1, 2)
 
@@ -251,8 +254,7 @@ class Problem:
 
         A flat table can't pass between nodes. But when a cable strikes the table and unrolls on it, each node comes
         down by itself, which dissipates more energy the farther they are apart. With twist and obstacles they are as
-        close as those for obstacles, because how evenly a bent cable is supported decides when its sections turn over
-        (scene 102:21).
+        close as those for obstacles, because how evenly a bent cable is supported decides when its sections turn over.
         """
         if self.contact is None or self.table is None:
             return np.inf

@@ -4,7 +4,7 @@
 
 The internal forces are those of the energy: EA/2 e^2 h of each edge and (EI |kappa - kappa_0|^2 + GJ (tau - tau_0)^2)
 w/2 of each hinge. Their rates are damped (docs/model.md eq. 7, 7a and 9). The same Runge-Kutta method integrates the
-rate of the memory (eq. 20).
+rate of the memory (docs/model.md eq. 20).
 """
 
 from typing import Any
@@ -73,9 +73,10 @@ def frames(body: Any, before: Any, q: Any, t: Any, a: Any, b: Any, lengths: Any)
 
 @compiled
 def returned(trial: float, threshold: float, pace: float) -> tuple[float, float]:
-    """Return the magnitude e of the elastic strain after yielding, and de/d(`trial`), the trial magnitude (eq. 20).
+    """Return the magnitude e of the elastic strain after yielding, and de/d(`trial`), the trial magnitude.
 
-    `pace` is the rate of the memory times the implicit part of the step: e + pace (e - threshold) = trial.
+    `pace` is the rate of the memory times the implicit part of the step: e + pace (e - threshold) = trial
+    (docs/model.md eq. 20).
     """
     if trial <= threshold:
         return trial, 1.0
@@ -280,7 +281,7 @@ def _add_full(body: Any, k: int, H: Any, W: Any, full: Any, K: Any) -> None:
 
 @compiled
 def add_drag(body: Any, v: Any, implicit: float, R: Any, K: Any, mode: int) -> None:
-    """Add the drag of the nodes and of the spins of the edges (eq. 8)."""
+    """Add the drag of the nodes and of the spins of the edges (docs/model.md eq. 8)."""
     c, c2 = body.law[DRAG], body.law[DRAG_QUADRATIC]
     for e in range(len(body.rest) if body.dims == 4 else 0):
         spins = c * body.law[GYRATION] ** 2 * body.rest[e]

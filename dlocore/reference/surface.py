@@ -74,7 +74,7 @@ def thickness(row: Any) -> float:
 
 @compiled
 def press(stiffness: float, width: float, damping: float, depth: float, approach: float) -> tuple[float, float, float]:
-    """Return the normal force per length N [N/m], dN/d(depth) and dN/d(speed of approach) (eq. 21)."""
+    """Return the normal force per length N [N/m], dN/d(depth) and dN/d(speed of approach): docs/model.md eq. 21."""
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
     slope = min(depth / width, 1.0)
@@ -89,11 +89,12 @@ def press(stiffness: float, width: float, damping: float, depth: float, approach
 def rub(
     limit: float, n: Any, slip: Any, v: Any, stick: float, density: float, implicit: float, force: Any, tangent: Any
 ) -> None:
-    """Write Coulomb's friction against the slip (3,) from an anchor (eq. 22), and minus its derivative, (3,), (3, 3).
+    """Write Coulomb's friction against the slip (3,) from an anchor, and minus its derivative, (3,), (3, 3).
 
-    f = -mu N x/max(|x|, s_0) with x = s + lag v. The lag makes the sticking critically damped, so that what sticks does
-    not swing about its anchor, and leaves the force of what slides as it is. The slip is limited to `stick` = s_0 [m]
-    in place, by dragging the anchor along. Components of slip and velocity along the normal n do not count.
+    f = -mu N x/max(|x|, s_0) with x = s + lag v (docs/model.md eq. 22). The lag makes the sticking critically damped,
+    so that what sticks does not swing about its anchor, and leaves the force of what slides as it is. The slip is
+    limited to `stick` = s_0 [m] in place, by dragging the anchor along. Components of slip and velocity along the
+    normal n do not count.
 
     Args:
         limit: mu N [N/m].

@@ -65,7 +65,16 @@ def _friction(value: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sphere(Checked):
-    """A ball at `center` (3,) of `radius` [m], with Coulomb friction."""
+    """A ball.
+
+    Args:
+        center: (3,) [m], coordinates of -10,000 to 10,000.
+        radius: [m], above 0, up to 10,000.
+        friction: Coulomb's mu between it and the cable, 0 to 10.
+
+    Raises:
+        SceneError: a value is not finite, or outside these limits.
+    """
 
     center: ArrayLike
     radius: float
@@ -90,7 +99,16 @@ class Sphere(Checked):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Capsule(Checked):
-    """All points within `radius` [m] of the segment from `start` (3,) to `end` (3,) [m]."""
+    """All points within a radius of a segment: a rod with round ends.
+
+    Args:
+        start, end: ends of the segment (3,) [m], coordinates of -10,000 to 10,000.
+        radius: [m], above 0, up to 10,000.
+        friction: Coulomb's mu between it and the cable, 0 to 10.
+
+    Raises:
+        SceneError: a value is not finite, or outside these limits, or the segment has no length.
+    """
 
     start: ArrayLike
     end: ArrayLike
@@ -127,7 +145,18 @@ class Capsule(Checked):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cylinder(Checked):
-    """A solid cylinder with flat ends: `center` (3,) [m], direction `axis` (3,), `radius` and `height` [m]."""
+    """A solid cylinder with flat ends.
+
+    Args:
+        center: (3,) [m], half-way between its ends, coordinates of -10,000 to 10,000.
+        radius: [m], above 0, up to 10,000.
+        height: [m], from end to end, above 0, up to 10,000.
+        axis: direction of its axis (3,), of any length.
+        friction: Coulomb's mu between it and the cable, 0 to 10.
+
+    Raises:
+        SceneError: a value is not finite, or outside these limits, or `axis` is zero.
+    """
 
     center: ArrayLike
     radius: float
@@ -164,7 +193,17 @@ class Cylinder(Checked):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Box(Checked):
-    """A solid box: `center` (3,) and edge lengths `size` (3,) [m], turned by the unit quaternion (w, x, y, z)."""
+    """A solid box.
+
+    Args:
+        center: (3,) [m], coordinates of -10,000 to 10,000.
+        size: lengths of its edges along its own x, y and z (3,) [m], above 0, up to 10,000.
+        orientation: unit quaternion (w, x, y, z) that turns it about its centre; None: its axes are those of the world.
+        friction: Coulomb's mu between it and the cable, 0 to 10.
+
+    Raises:
+        SceneError: a value is not finite, or outside these limits, or `orientation` is no unit quaternion.
+    """
 
     center: ArrayLike
     size: ArrayLike

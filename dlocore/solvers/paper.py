@@ -109,7 +109,7 @@ def _equations(
     Z: Floats,
     histories: History,
 ) -> tuple[Floats, Floats]:
-    """Return the stacked regression matrix (eq. 21, 23) in the free unknowns and the residuals at the iterate."""
+    """Return the stacked regression matrix (paper eq. 21, 23) in the free unknowns and the residuals at the iterate."""
     n_t, n_u, nc = control.shape
     size, free = n_u * nc, window.free
     K, dense = np.empty((size, 4 * nc)), np.empty((size, size))

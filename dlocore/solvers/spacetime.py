@@ -174,9 +174,9 @@ class WindowSolver:
         return control
 
     def objective(self, control: Floats, matrix: bool) -> tuple[float, Floats, Floats]:
-        """Return the objective, eq. 16 [m^2], the normal matrix in blocks, and its right side at `control`.
+        """Return the objective [m^2], the normal matrix in blocks, and its right side at `control`.
 
-        Without `matrix` the normal matrix, which is most of the work, is left out.
+        See docs/model.md eq. 16. Without `matrix` the normal matrix, which is most of the work, is left out.
         """
         count, eq = len(control) - 2, self.equations
         A = np.zeros(

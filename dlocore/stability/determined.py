@@ -131,7 +131,10 @@ def _hardly_bent(start: StartCurve) -> bool:
 
 
 def may_grow(problem: Problem, motion: March) -> bool:
-    """Tell whether a disturbance may grow by much in a motion, judged by the tangents of some states (eq. 18a)."""
+    """Tell whether a disturbance may grow by much in a motion, judged by the tangents of some states.
+
+    See docs/model.md eq. 18a.
+    """
     growth = motion.growth
     if growth is None:
         growth = sum(float(rates.mean() * (times[-1] - times[0])) for times, rates in _rates(problem, motion))
