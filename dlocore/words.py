@@ -6,6 +6,11 @@ def in_mm(length: float, digits: int = 2) -> str:
     return f"{_short(1e3 * length, digits)} mm"
 
 
+def in_um(length: float, digits: int = 2) -> str:
+    """Return a length [m] in micrometres, with `digits` significant digits, or whole if large: 1000 um, not 1e+03."""
+    return f"{_short(1e6 * length, digits)} um"
+
+
 def in_ms(time: float, digits: int = 3) -> str:
     """Return a time [s] in milliseconds, with `digits` significant digits, or whole if large: 2000 ms, not 2e+03."""
     return f"{_short(1e3 * time, digits)} ms"

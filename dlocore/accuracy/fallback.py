@@ -14,7 +14,7 @@ from dlocore.levels.level import Level
 from dlocore.prediction import Prediction
 from dlocore.scene.scene import MAX_N_T, Quality, Scene
 from dlocore.solvers.monitor import Monitor
-from dlocore.words import in_mm
+from dlocore.words import in_mm, in_ms
 
 _MORE_IN_TIME = 2  # times the control points in time of a least squares
 # control points in time times the cube of the coordinates along the cable, up to which a least squares is solved
@@ -88,7 +88,7 @@ def by_march(marched: Prediction, tried: Sequence[tuple[Quality, Prediction | Sc
         spent: time spent on them [s].
     """
     ends = [f"on {quality.n_u} x {quality.n_t} control points {_end(found)}" for quality, found in tried]
-    least = f"the requested least squares, which did not converge in {spent * 1e3:.0f} ms"
+    least = f"the requested least squares, which did not converge in {in_ms(spent)}"
     return replace(marched, said=f"{marched.said} A march gives the answer instead of {least}: {'; '.join(ends)}.")
 
 
@@ -118,15 +118,15 @@ def with_finer(found: Prediction, finer: Prediction | SceneError, spent: float, 
         failed = f"err {off}" if off else failed
         said = (
             f"{finer.said} The requested {quality.n_u} x {quality.n_t} control points {failed}, which took "
-            f"{spent * 1e3:.0f} ms to find out: {found.said} This answer is on {accuracy.n_u} x {accuracy.n_t}, with "
-            f"{known}, which took {more * 1e3:.0f} ms more."
+            f"{in_ms(spent)} to find out: {found.said} This answer is on {accuracy.n_u} x {accuracy.n_t}, with "
+            f"{known}, which took {in_ms(more)} more."
         )
         return replace(finer, scene=found.scene, said=said)
     reason = str(finer) if isinstance(finer, SceneError) else finer.said
     failed = f", as it errs {off}, but do not converge" if off else " but do not converge either"
     return replace(
         found,
-        said=f"{found.said} Finer grids were tried for {more * 1e3:.0f} ms{failed}: {reason}",
+        said=f"{found.said} Finer grids were tried for {in_ms(more)}{failed}: {reason}",
         iterations=tuple(monitor.iterations),
         accuracy=replace(found.accuracy, wall_time=monitor.elapsed(), phases=dict(monitor.phases)),
     )

@@ -70,7 +70,7 @@ def noise_of_free(recording: Recording) -> Floats:
 def _without_outliers(t: Floats, x: Floats) -> tuple[Floats, Floats]:
     """Return the samples without those that leave the cubic through their four neighbours, the worst ones first."""
     for _ in range(_PASSES):
-        if len(t) < 8:
+        if len(t) < _LEAST:
             break
         away = _leaps(t, x)
         limit = max(_JUMP * 1.4826 * float(np.median(away)), _FLOOR)
@@ -112,7 +112,9 @@ def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:
     most = _MOST * noise_of(x)  # otherwise the path could be all noise
     for _ in range(_PASSES):
         if keep.sum() < _LEAST:
-            raise SceneError("markers", f"{keep.sum()} samples of a held marker", "at least 8 that are not outliers")
+            raise SceneError(
+                "markers", f"{keep.sum()} samples of a held marker", f"at least {_LEAST} that are not outliers"
+            )
         first, last = t[keep][0], t[keep][-1]
         spans = max(round(min(_SPANS * keep.sum(), (last - first) / _KNOT)), _LEAST)
         path = smooth(t[keep] - first, x[keep] - middle, np.ones(keep.sum()), last - first, spans, most)

@@ -14,7 +14,7 @@ from dlocore.shape.shape import StartCurve
 from dlocore.solvers.march import March, march
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import DEGREE
-from dlocore.words import in_mm
+from dlocore.words import in_mm, in_um
 
 Floats = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ def in_words(problem: Problem, moved: float) -> str:
 
 def bend_in_words(problem: Problem, moved: float) -> str:
     """Return a message that a tiny bend of the start changes the motion by `moved` [m]."""
-    bend = f"{DISTURBED * problem.scene.cable.length * 1e6:.2g} um"
+    bend = in_um(DISTURBED * problem.scene.cable.length)
     turned = "" if problem.twist is None else f" and turning its sections by {TURNED * 1e3:.2g} mrad"
     return f"bending the start by a millionth of the length, {bend},{turned} changes the motion by up to {in_mm(moved)}"
 

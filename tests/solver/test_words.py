@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from dlocore import Quality, predict, sensitivities
-from dlocore.words import counted, in_mm, in_ms, in_newtons
+from dlocore.words import counted, in_mm, in_ms, in_newtons, in_um
 from tests.solver.scenes import paper_scene
 
 
@@ -27,9 +27,10 @@ def test_a_length_has_its_digits_and_no_exponent_where_it_is_long(length: float,
     assert in_mm(length, digits) == words
 
 
-def test_forces_times_and_counts():
+def test_forces_times_short_lengths_and_counts():
     assert [in_newtons(force) for force in (263.7, 61254.7, 0.0574, 2.0)] == ["264 N", "61255 N", "0.057 N", "2 N"]
     assert [in_ms(time) for time in (2.0, 1.2345, 0.0123, 4e-7)] == ["2000 ms", "1234 ms", "12.3 ms", "0.0004 ms"]
+    assert [in_um(length) for length in (1e-6, 1e-3, 1.234e-5)] == ["1 um", "1000 um", "12 um"]
     assert [counted(count, "iteration") for count in (0, 1, 2)] == ["0 iterations", "1 iteration", "2 iterations"]
 
 
