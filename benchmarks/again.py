@@ -6,10 +6,6 @@ known (`predict(scene, like=known)`). Times are medians of three. The error is t
 refined until it no longer changes; it is judged only if that march is at least five times as accurate. One thread.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import sys
 import time

@@ -6,10 +6,6 @@ with a hundred times the axial stiffness, which is as close as possible to a cab
 row gives how far these motions are apart, as shares of the length, and the error estimate of each.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -6,10 +6,6 @@ processor times, so that other programs on the machine do not count. The first g
 `--calibrated` it is chosen from the results of `dlo calibrate` on this machine.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import time
 from collections import defaultdict

@@ -6,10 +6,6 @@ their paths. Over the time of the second part, the distance between the two moti
 three error estimates, both as shares of the length.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 from dataclasses import replace
 

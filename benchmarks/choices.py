@@ -11,10 +11,6 @@
   first acceleration.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 from collections.abc import Callable
 from contextlib import nullcontext

@@ -5,11 +5,8 @@ error of 0.2 % of the length. Then each effect is left out of a scene that calls
 are medians of whole calls of `predict` after a first one that is not counted. One thread.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
+import os
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

@@ -11,10 +11,6 @@ For every setting the benchmark prints the number of judged answers, quantiles o
 `--truths` keeps the refined marches, which take most of the time: remove the folder when the model changes.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import json
 import sys

@@ -5,10 +5,6 @@ given grid), and random hard scenes. Each is solved once so that all code is loa
 `--deadline`.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 from collections.abc import Iterator
 from dataclasses import replace

@@ -10,10 +10,6 @@ is within the estimated one; quantiles of estimate/true, both as root mean squar
 ratios in 0.5 to 5, and below 0.5. Then every force beyond these bounds. One thread.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import sys
 from collections.abc import Iterator

@@ -7,10 +7,6 @@ are. The truth is marched with half the time step of the replays, on a net of as
 (`--truth`).
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 from time import process_time
 

@@ -6,10 +6,6 @@ more than twice the two error estimates and by more than 0.1 % of the length: th
 so. Answers that report crossing strands are skipped. `--index 17` runs only scene 17.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace

@@ -6,11 +6,8 @@ two grippers. Each number is the median over the repeats, in which the numbers o
 compared bit for bit with that of one thread.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
+import os
 import time
 from collections import defaultdict
 

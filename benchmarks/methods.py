@@ -6,10 +6,6 @@ length. Scenes for which the truth does not converge are left out of the errors.
 that grid, or whose least squares runs out of time, are left out entirely.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import itertools
 from collections.abc import Iterator

@@ -7,10 +7,6 @@ the time this took. With `--reference`, the converged ones are compared with the
 runs only scene 17.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import multiprocessing
 import time
 from collections import Counter

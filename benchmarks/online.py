@@ -3,10 +3,6 @@
 Prints the processor time of an update, and how the estimate approaches the truth from a cable three times too stiff.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 from dataclasses import replace
 from time import process_time

@@ -8,10 +8,6 @@ estimates. Starts that settle are left out, because any weight turns them, and s
 the place of the acceleration. `--index 17` runs only scene 17.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 from dataclasses import replace
 from typing import cast
 

@@ -7,12 +7,9 @@ project's own march, refined until it changes by less than 0.1 mm. The explicit 
 compiled too, but its time includes building the tables of the grasp's path in Python.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import json
+import os
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace

@@ -5,10 +5,6 @@ not have. The scenes that both solve within their deadlines are counted. A scene
 between the two anywhere is more than twice the two error estimates. `--index 17` runs only scene 17.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import multiprocessing
 from collections.abc import Iterable
 from dataclasses import replace

@@ -6,10 +6,6 @@ the largest distance between the two anywhere, and their times. The scenes are t
 of the catalogue that are named here, in the plane and in space, with every effect that the reference has.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import time
 from dataclasses import replace

@@ -7,10 +7,6 @@ given as the control points of the answer. They are also predicted as seen from 
 distance between the answers is compared with the sum of both error estimates, as shares of the length.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 from collections import Counter
 from collections.abc import Iterator

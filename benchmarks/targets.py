@@ -9,10 +9,6 @@ Times are medians of whole calls of `predict` on one core. The error is the larg
 until it no longer changes.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import time
 from collections.abc import Callable

@@ -11,10 +11,6 @@ Three answers are computed: the equilibrium under slowly growing rotation, a mot
 problem of Kirchhoff's rod, which uses none of the solver (docs/validation-wires.md).
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import json
 from dataclasses import dataclass, replace

@@ -90,23 +90,29 @@ __all__ = [
     "warm_up",
 ]
 
+# modules of the names that are imported on first use
+_HOMES = {
+    "Equilibrium": "statics.statics",
+    "Plan": "planning",
+    "Sensitivities": "sensitivity",
+    "effect_forces": "balance",
+    "energies": "balance",
+    "equilibrium": "statics.statics",
+    "plan": "planning",
+    "predict": "front",
+    "predict_many": "many",
+    "sensitivities": "sensitivity",
+    "warm_up": "warming",
+}
+
 
 def __getattr__(name: str) -> Any:
     """Import the solver on first use: its compiler takes longer to import than the rest of the package together."""
-    homes = {
-        "predict": "front",
-        "warm_up": "warming",
-        "equilibrium": "statics.statics",
-        "Equilibrium": "statics.statics",
-    }
-    homes |= {"plan": "planning", "Plan": "planning", "energies": "balance", "effect_forces": "balance"}
-    homes |= {"predict_many": "many"}
-    homes |= {"sensitivities": "sensitivity", "Sensitivities": "sensitivity"}
-    if name not in homes:
+    if name not in _HOMES:
         raise AttributeError(name)
     import importlib
 
-    found = getattr(importlib.import_module(f"dlocore.{homes[name]}"), name)
+    found = getattr(importlib.import_module(f"dlocore.{_HOMES[name]}"), name)
     globals()[name] = found  # later look-ups do not come here
     return found
 

@@ -5,10 +5,6 @@ settings are searched for the fastest that keep the largest error over the motio
 winners are timed again, medians of processor time, one thread, set-up apart. docs/peers.md tells how each is set up.
 """
 
-import os
-
-os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1", VECLIB_MAXIMUM_THREADS="1")
-
 import argparse
 import json
 import math

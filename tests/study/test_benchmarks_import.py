@@ -1,8 +1,10 @@
 """Benchmarks are run seldom: that they find all that they take from the program, and measure what they say."""
 
 import importlib
+import os
 import pkgutil
 import runpy
+import subprocess
 import sys
 
 import pytest
@@ -29,6 +31,13 @@ def test_benchmark_finds_what_it_takes_from_the_program(name: str) -> None:
 
 def test_all_benchmarks_are_looked_at() -> None:
     assert {"benchmarks.choices", "benchmarks.hard.generator", "benchmarks.peers.cosserat"} <= set(MODULES)
+
+
+def test_benchmarks_set_the_number_of_threads_before_numpy_reads_it() -> None:
+    program = "import os, sys; import benchmarks; print(os.environ['OMP_NUM_THREADS'], 'numpy' in sys.modules)"
+    around = {name: value for name, value in os.environ.items() if not name.endswith("_THREADS")}
+    done = subprocess.run([sys.executable, "-c", program], env=around, capture_output=True, text=True, timeout=60)
+    assert done.stdout.split() == ["1", "False"], done.stderr
 
 
 @pytest.mark.parametrize("name", ["benchmarks.choices", "benchmarks.health"])
