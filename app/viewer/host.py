@@ -60,16 +60,14 @@ class SceneHost:
             self._server.stop()
 
     async def _open(self, client: ClientHandle) -> None:
-        connection = self._server._websock_server._live_connections.get(client.client_id)
+        live = self._server._websock_server._live_connections
+        connection = live.get(client.client_id)
         if connection is None:
             return
         request = connection.request
         headers = {} if request is None else request.headers
         if not hmac.compare_digest(headers.get(KEY_HEADER, "").encode(), self.key.encode()):
             await connection.close()  # it did not come through the gateway, which is protected by a check of origins
-            return
-        if len(self.sessions) >= self._most:
-            await connection.close()  # two clients came at once, and only one place was left
             return
         tab = headers.get(TAB_HEADER, "")
         work, lost = self._found(tab), None
@@ -84,6 +82,11 @@ class SceneHost:
                 )
             elif tab and not tab.startswith(self.era):
                 lost = ("The service was restarted", "This scene starts from the beginning; earlier edits are lost.")
+        # the client may have left while the scene was read, or others may have taken the last places
+        if client.client_id not in live or len(self.sessions) >= self._most:
+            await connection.close()
+            return
+        self._left.pop(tab, None)
         self.sessions[client.client_id] = Session(client, self._shared, headers.get(ADDRESS_HEADER, ""), tab, work)
         if lost is not None:
             client.add_notification(*lost, color="yellow")
@@ -99,7 +102,7 @@ class SceneHost:
         for session in self.sessions.values():
             if tab and session.tab == tab:
                 return session.work()
-        return self._left.pop(tab, None)
+        return self._left.get(tab)
 
     async def _close(self, client: ClientHandle) -> None:
         session = self.sessions.pop(client.client_id, None)

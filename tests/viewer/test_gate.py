@@ -1,7 +1,10 @@
 """Who is let into the scene, how many at once, and what its page may do."""
 
 import re
+import threading
 import time
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -10,8 +13,35 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from app.pages.gallery import examples
+from app.viewer import host
 from app.viewer.draft import start_draft
+from app.viewer.gateway import BEGIN_HEADER, KEY_HEADER
 from tests.viewer.conftest import MOST_SCENES
+
+
+@pytest.fixture
+def slow_to_read(monkeypatch) -> Iterator[tuple[host.SceneHost, threading.Event]]:
+    """A host with two places whose scenes do nothing, and the event for which it waits before it opens a stored run."""
+    read = threading.Event()
+    monkeypatch.setattr(host, "of_run", lambda *_: read.wait(10) and start_draft())
+    monkeypatch.setattr(host, "Session", lambda *_: SimpleNamespace(tab="", close=lambda: None))
+    scenes = host.SceneHost(SimpleNamespace(runs=None), most=2)
+    yield scenes, read
+    read.set()
+    scenes.stop()
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    give_up = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < give_up, "it did not come to that in time"
+        time.sleep(0.02)
+
+
+def coming(scenes: host.SceneHost) -> SceneClient:
+    """Return a client that asks for a stored run."""
+    headers = {KEY_HEADER: scenes.key, BEGIN_HEADER: "run-any"}
+    return SceneClient(f"ws://127.0.0.1:{scenes.port}", additional_headers=headers)
 
 
 def test_a_foreign_origin_is_refused(service):
@@ -59,11 +89,8 @@ def test_a_wrong_protocol_version_ends_the_connection(service):
 
 
 def test_no_more_scenes_are_opened_than_allowed_and_a_page_says_so(service):
-    host = service.app.state.viewer_upstream
-    give_up = time.monotonic() + 30
-    while host.open_scenes():
-        assert time.monotonic() < give_up
-        time.sleep(0.02)
+    upstream = service.app.state.viewer_upstream
+    wait_for(lambda: not upstream.open_scenes())
     clients = [connected(service) for _ in range(MOST_SCENES)]
     try:
         page = httpx.get(f"{service.address}/scene/")
@@ -74,10 +101,31 @@ def test_no_more_scenes_are_opened_than_allowed_and_a_page_says_so(service):
     finally:
         for client in clients:
             client.socket.close()
-    give_up = time.monotonic() + 30
-    while httpx.get(f"{service.address}/scene/", follow_redirects=True).status_code != 200:
-        assert time.monotonic() < give_up, "closed tabs still take places"
-        time.sleep(0.02)
+    wait_for(lambda: httpx.get(f"{service.address}/scene/", follow_redirects=True).status_code == 200)
+
+
+def test_clients_that_come_at_once_take_no_more_places_than_there_are(slow_to_read):
+    scenes, read = slow_to_read
+    clients = [coming(scenes) for _ in range(6)]
+    wait_for(lambda: len(scenes._server.get_clients()) == 6)
+    read.set()
+    wait_for(lambda: len(scenes._server.get_clients()) == 2)
+    assert len(scenes.sessions) == 2
+    for client in clients:
+        client.socket.close()
+
+
+def test_a_client_that_leaves_while_its_run_is_read_takes_no_place(slow_to_read):
+    scenes, read = slow_to_read
+    leaving = coming(scenes)
+    wait_for(scenes._server.get_clients)
+    leaving.socket.close()
+    wait_for(lambda: not scenes._server.get_clients())
+    read.set()
+    with coming(scenes):
+        wait_for(lambda: scenes.sessions)
+        assert len(scenes.sessions) == 1
+        assert list(scenes.sessions) == list(scenes._server.get_clients())
 
 
 def test_the_address_of_an_example_leads_to_it(service):
