@@ -256,9 +256,9 @@ def read_scene(file: str) -> Scene:
 
 
 def _stored(id: str) -> Any:
-    from app.store.runs import RunStore
+    from app.store.runs import motion_of
 
-    return RunStore(_settings()).motion(id)
+    return motion_of(_settings().data_dir, id)
 
 
 def _solve(request: PredictionRequest, deadline: float | None) -> Prediction:

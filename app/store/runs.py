@@ -25,6 +25,7 @@ from app.store.leftovers import claim
 from dlocore import Prediction
 
 _log = logging.getLogger("dlo")
+RUNS = "runs"  # directory of the runs in a data directory
 REQUEST, DOCUMENT, NETS, SUMMARY, RECORDING = "scene.json", "prediction.json", "nets.npz", "summary.json", "run.rrd"
 
 
@@ -44,7 +45,7 @@ class RunStore:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._root = settings.data_dir / "runs"
+        self._root = settings.data_dir / RUNS
         self._max_runs = settings.max_runs
         self._max_bytes = settings.max_run_bytes
         self._lock = threading.Lock()
@@ -207,12 +208,7 @@ class RunStore:
         return self._read(id, DOCUMENT)
 
     def _read(self, id: str, name: str) -> bytes | None:
-        if id not in self._entries:
-            return None
-        try:
-            return (self._root / id / name).read_bytes() or None  # a file that was emptied is as good as none
-        except (FileNotFoundError, NotADirectoryError):  # removed since
-            return None
+        return _content(self._root / id / name) if id in self._entries else None
 
     def load(self, id: str) -> Run | None:
         """Return a run with its surface and iterates, or None if there is no such run."""
@@ -224,8 +220,7 @@ class RunStore:
 
     def motion(self, id: str) -> Motion | None:
         """Return the motion of a run, or None if there is no such run."""
-        nets = self._read(id, NETS)
-        return None if nets is None else unpack_motion(nets)
+        return motion_of(self._root.parent, id) if id in self._entries else None
 
     def recording(self, id: str) -> bytes | None:
         """Return the recording (.rrd) of a run, which is written at the first request; None if there is no such run.
@@ -263,6 +258,20 @@ class RunStore:
             removed = self._evict()
         _delete(removed)
         return True
+
+
+def motion_of(data_dir: Path, id: str) -> Motion | None:
+    """Return the motion of a run that is stored in a data directory, or None if there is none; change nothing there."""
+    nets = _content(data_dir / RUNS / id / NETS)
+    return None if nets is None else unpack_motion(nets)
+
+
+def _content(file: Path) -> bytes | None:
+    """Return what a file contains, or None if there is none; a file that was emptied is as good as none."""
+    try:
+        return file.read_bytes() or None
+    except (FileNotFoundError, NotADirectoryError):
+        return None
 
 
 def _summary(directory: Path) -> dict[str, Any] | None:

@@ -10,6 +10,7 @@ import orjson
 import pytest
 from fastapi.testclient import TestClient
 
+from app.commands.commands import read_scene
 from app.main import create_app
 from app.schemas import PredictionRequest, to_scene
 from app.schemas.ids import new_id
@@ -224,6 +225,18 @@ def test_recordings_go_before_runs_do(tmp_path: Path, prediction: Prediction, mo
 def test_a_lower_cap_evicts_at_the_next_start(tmp_path: Path, prediction: Prediction) -> None:
     _, ids = fill(tmp_path, prediction, 4)
     assert listed(store(tmp_path, max_runs=2)) == ids[:1:-1]
+
+
+def test_a_command_that_goes_on_from_a_run_leaves_the_others_of_a_service_with_higher_caps(
+    tmp_path: Path, prediction: Prediction, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, ids = fill(tmp_path, prediction, 3)
+    monkeypatch.setenv("DLO_DATA_DIR", str(tmp_path))
+    monkeypatch.setenv("DLO_MAX_RUNS", "1")
+    shape = {"kind": "prediction", "id": ids[0]}
+    (tmp_path / "scene.json").write_bytes(orjson.dumps({**paper_scene(), "shape": shape}))
+    read_scene(str(tmp_path / "scene.json"))
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ids
 
 
 def test_a_second_process_on_a_data_directory_is_told_of_the_first(
