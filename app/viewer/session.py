@@ -30,6 +30,7 @@ from app.viewer.shapes import straightened, with_points
 from app.viewer.solving import Kind, Outcome, Solver, SolverThread
 from app.viewer.step_buttons import REDO, UNDO
 from app.viewer.tracking import Tracking, TrackingActions
+from app.viewer.transfers import limit_uploads
 from dlocore import Prediction, SceneError, SplineSurface
 
 FRAME = 1 / 40  # s
@@ -128,6 +129,7 @@ class Session:
         self._edits = Edits(lambda: self._draft, self._edited, self._tell)
         # viser calls no on_update for "0.0" after "0", on the way to 0.02: the value is the same
         client._websock_connection.register_handler(GuiUpdateMessage, lambda *_: self._edits.go_on())
+        limit_uploads(client, self._refuse_file)
         self._panel = Panel(
             client,
             self._draft,
@@ -494,12 +496,15 @@ class Session:
         try:
             draft = await asyncio.to_thread(uploads.opened, self._current(), name, content)
         except SceneError as error:
-            self._client.add_notification(f"{name} was not opened", str(error), color="red", auto_close_seconds=12.0)
+            self._refuse_file(name, error)
             self._panel.say_file(f"{name} was not opened: {error}", good=False)
             return
         self._panel.say_file(f"{name} was opened.", good=True)
         self._tracking.leave()
         self._replace(draft)
+
+    def _refuse_file(self, name: str, error: SceneError) -> None:
+        self._client.add_notification(f"{name} was not opened", str(error), color="red", auto_close_seconds=12.0)
 
     def _show_recorded(self, draft: Draft) -> None:
         """Show a scene with its markers, without the surface and the ghosts that would hide them."""

@@ -38,6 +38,14 @@ def decode(frame: bytes) -> list[dict[str, Any]]:
     return [filled(message) for message in document["messages"]]
 
 
+def wait_for(condition: Callable[[], object]) -> None:
+    """Wait until `condition` holds, which needs no messages to be processed."""
+    give_up = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < give_up, "it did not come to that in time"
+        time.sleep(0.02)
+
+
 class SceneClient:
     """Connects to the scene, and keeps the last state of its nodes and controls that the server sent."""
 
@@ -54,6 +62,7 @@ class SceneClient:
         self.notifications: list[str] = []
         self.notices: list[str] = []  # their texts
         self.downloads: dict[str, bytes] = {}
+        self.arrived: dict[str, bool] = {}  # whether the server has acknowledged the whole upload
         self._transfers: dict[str, tuple[str, int]] = {}
         self._parts: dict[str, dict[int, bytes]] = {}
         self.camera: list[float] = []  # its position [m]
@@ -128,6 +137,8 @@ class SceneClient:
                 self.notices.append(message["props"]["body"])
             elif kind == "FileTransferStartDownload":
                 self._transfers[message["transfer_uuid"]] = (message["filename"], message["part_count"])
+            elif kind == "FileTransferPartAck":
+                self.arrived[message["transfer_uuid"]] = message["transferred_bytes"] >= message["total_bytes"]
             elif kind == "FileTransferPart":
                 self._take_part(message)
             elif kind.startswith("Gui") and "props" in message:
@@ -185,6 +196,10 @@ class SceneClient:
 
     def upload(self, label: str, name: str, content: bytes) -> None:
         """Open a file by the button with this label."""
+        self.send_part(label, self.begin_upload(label, name, len(content)), 0, content)
+
+    def begin_upload(self, label: str, name: str, size: int, *, parts: int = 1) -> str:
+        """Announce a file of `size` bytes in so many parts to the button with this label; return its id."""
         transfer = str(uuid4())
         self.send(
             type="FileTransferStartUpload",
@@ -192,14 +207,18 @@ class SceneClient:
             transfer_uuid=transfer,
             filename=name,
             mime_type="application/octet-stream",
-            part_count=1,
-            size_bytes=len(content),
+            part_count=parts,
+            size_bytes=size,
         )
+        return transfer
+
+    def send_part(self, label: str, transfer: str, index: int, content: bytes) -> None:
+        """Send a part of an announced file."""
         self.send(
             type="FileTransferPart",
             source_component_uuid=self.control(label)[0],
             transfer_uuid=transfer,
-            part_index=0,
+            part_index=index,
             content=content,
         )
 

@@ -4,15 +4,19 @@ import contextlib
 import io
 import json
 import tracemalloc
+from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from protocol_client import NOTHING_STORED, connected
+from protocol_client import NOTHING_STORED, SceneClient, connected, wait_for
+from viser import ClientHandle
 
 from app.schemas import PredictionRequest, to_scene
 from app.schemas.request import EXAMPLES, TWO_GRIPPERS
-from app.viewer import shapes, uploads
+from app.viewer import host, shapes, transfers, uploads
 from app.viewer.draft import Draft, start_draft
+from app.viewer.gateway import KEY_HEADER
 from app.viewer.outbox import file_name
 from dlocore import SceneError
 
@@ -142,6 +146,51 @@ def test_only_the_array_that_is_used_is_unpacked_and_none_that_is_too_large():
     np.savez_compressed(buffer, points=np.zeros((largest // 24 + 1, 3)))
     with pytest.raises(SceneError, match=f"at most {largest} bytes"):
         uploads.opened(start_draft(), "points.npz", buffer.getvalue())
+
+
+@pytest.fixture
+def uploading(monkeypatch) -> Iterator[tuple[SceneClient, dict[str, bytes]]]:
+    """A client that can only upload files of at most 1000 bytes, and the files that arrived."""
+    files: dict[str, bytes] = {}
+
+    def session(client: ClientHandle, *_: object) -> SimpleNamespace:
+        button = client.gui.add_upload_button("Open")
+        button.on_upload(lambda _: files.update({button.value.name: button.value.content}))
+        transfers.limit_uploads(client, lambda name, error: client.add_notification(name, str(error)))
+        return SimpleNamespace(tab="", close=lambda: None)
+
+    monkeypatch.setattr(transfers, "LARGEST", 1000)
+    monkeypatch.setattr(host, "Session", session)
+    scenes = host.SceneHost(SimpleNamespace(runs=None), most=1)
+    with SceneClient(f"ws://127.0.0.1:{scenes.port}", additional_headers={KEY_HEADER: scenes.key}) as client:
+        client.wait_for(lambda: client.controls)
+        yield client, files
+    scenes.stop()
+
+
+@pytest.mark.parametrize(("announced", "parts", "words"), [(1001, 0, "1001"), (8, 2, "1200")])
+def test_a_file_that_is_too_large_is_dropped_while_it_is_uploaded(uploading, announced, parts, words):
+    client, files = uploading
+    transfer = client.begin_upload("Open", "large.json", announced, parts=3)
+    for k in range(parts):
+        client.send_part("Open", transfer, k, bytes(600))
+    client.wait_for(lambda: client.notifications == ["large.json"] and client.arrived[transfer])
+    assert client.notices == [f"file: got {words} bytes. Allowed: at most 1000 bytes."]
+    client.upload("Open", "small.json", bytes(1000))
+    wait_for(lambda: files)
+    assert files == {"small.json": bytes(1000)}
+
+
+def test_no_more_files_are_uploaded_at_once_than_the_page_has_buttons(uploading):
+    client, files = uploading
+    first = [client.begin_upload("Open", f"{k}.json", 10) for k in range(3)]
+    client.wait_for(lambda: client.notifications == ["2.json"])
+    assert client.notices == ["file: got 3 files at once. Allowed: at most 2."]
+    for transfer in first:
+        client.send_part("Open", transfer, 0, bytes(10))
+    wait_for(lambda: len(files) == 2)
+    client.listen(0.05)
+    assert sorted(files) == ["0.json", "1.json"]
 
 
 def test_a_refused_file_leaves_the_scene_as_it_was(service):

@@ -2,13 +2,12 @@
 
 import re
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import SimpleNamespace
 
 import httpx
 import pytest
-from protocol_client import SUBPROTOCOL, SceneClient, connected, opened
+from protocol_client import SUBPROTOCOL, SceneClient, connected, opened, wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -29,13 +28,6 @@ def slow_to_read(monkeypatch) -> Iterator[tuple[host.SceneHost, threading.Event]
     yield scenes, read
     read.set()
     scenes.stop()
-
-
-def wait_for(condition: Callable[[], object]) -> None:
-    give_up = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < give_up, "it did not come to that in time"
-        time.sleep(0.02)
 
 
 def coming(scenes: host.SceneHost) -> SceneClient:
