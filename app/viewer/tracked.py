@@ -1,8 +1,7 @@
 """A recording in the scene: the shown window as a scene, and the distance of a prediction from it."""
 
 import tempfile
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,11 +34,13 @@ class Tracked:
         windows: windows of about 5 s.
         candidate: what is known about the cable, or was identified.
         shown: index of the shown window.
+        replays: replays of windows by their indices, each made when it is first needed.
     """
 
     windows: tuple[Recording, ...]
     candidate: Candidate
     shown: int = 0
+    replays: dict[int, Replay] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def of(recording: Recording) -> "Tracked":
@@ -119,9 +120,11 @@ class Tracked:
         """The frames' times in the scene (k,) [s]."""
         return np.asarray(cast(Floats, self.recording.times) - self._replay.begin)
 
-    @cached_property
+    @property
     def _replay(self) -> Replay:
-        return Replay(self.recording, Resolution(n_u=N_U, step=STEP))
+        if self.shown not in self.replays:
+            self.replays[self.shown] = Replay(self.recording, Resolution(n_u=N_U, step=STEP))
+        return self.replays[self.shown]
 
     def distances(self, prediction: Prediction) -> Floats:
         """Return the median distance of the free markers from a prediction at every frame (k,) [m]; NaN if unknown."""

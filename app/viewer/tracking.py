@@ -65,7 +65,7 @@ class Tracking:
         self._beside: dict[str, bytes] = {}
         self._distances: Floats | None = None
         self._cancelled: threading.Event | None = None
-        self._found: Identification | None = None
+        self._showing: asyncio.Task[None] | None = None
         self._markers = scene.add_point_cloud(
             "/measured",
             np.zeros((1, 3)),
@@ -107,12 +107,18 @@ class Tracking:
     def leave(self) -> None:
         """Drop the recording, since another scene is shown."""
         self.close()
-        self._tracked = self._distances = self._found = None
+        self._tracked = self._distances = None
         self._markers.visible = False
         self._form.take([])
 
     def close(self) -> None:
-        """End a running search."""
+        """End a running search, and show no other window any more."""
+        self._end_search()
+        if self._showing is not None:
+            self._showing.cancel()
+            self._showing = None
+
+    def _end_search(self) -> None:
         if self._cancelled is not None:
             self._cancelled.set()
             self._cancelled = None
@@ -122,9 +128,18 @@ class Tracking:
         if self._tracked is not None and 0 <= number < len(self._tracked.windows):
             with contextlib.suppress(SceneError):  # an impossible cable is not taken over
                 self._tracked = self._tracked.edited(self._actions.draft())
-            self._tracked = replace(self._tracked, shown=number)
-            self._distances = None
-            self._actions.show(self._tracked.draft())
+            self._show(replace(self._tracked, shown=number))
+
+    def _show(self, tracked: Tracked) -> None:
+        """Show a window as soon as its scene is made, which would take too long on the event loop."""
+        if self._showing is not None:
+            self._showing.cancel()
+        self._showing = asyncio.create_task(self._make(tracked))
+
+    async def _make(self, tracked: Tracked) -> None:
+        draft = await asyncio.to_thread(tracked.draft)
+        self._tracked, self._distances = tracked, None
+        self._actions.show(draft)
 
     def take_prediction(self, prediction: Prediction) -> None:
         """Measure how far a prediction of the shown window is from the markers."""
@@ -152,7 +167,7 @@ class Tracking:
         if self._tracked is None:
             return
         if self._cancelled is not None:
-            self.close()
+            self._end_search()
             self._form.running(False)
             self._form.found("Stopped.", keep=False)
             return
@@ -200,11 +215,10 @@ class Tracking:
     def _take(self, found: Identification) -> None:
         """Show the result of a search, and the recording with the identified cable."""
         assert self._tracked is not None
-        self._cancelled, self._found = None, found
-        self._tracked = replace(self._tracked, candidate=found.candidate)
+        self._cancelled = None
         self._form.running(False)
         self._form.found(say.result(found), keep=True)
-        self._actions.show(self._tracked.draft())
+        self._show(replace(self._tracked, candidate=found.candidate))
 
     def keep(self, name: str) -> None:
         """Keep the cable and the drag of the edited scene as a preset."""

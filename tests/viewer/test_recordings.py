@@ -1,17 +1,22 @@
 """A recording in the scene: markers over the prediction, the error over time, the cable identified and kept."""
 
+import asyncio
 import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from threading import get_ident
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from protocol_client import SceneClient, connected
 
 from app.service import searches
-from app.viewer import tracked
+from app.viewer import tracked, tracking
 from app.viewer.kept import FILE, KeptCables
+from app.viewer.tracked import Tracked
+from app.viewer.tracking import Tracking, TrackingActions
 from app.viewer.tracking_report import error_card
 from benchmarks.simulated_recordings import CABLE, DRAG, simulated
 from dlocore import PointMass, SceneError
@@ -140,6 +145,42 @@ def test_a_connector_is_in_the_scene_of_a_recording_and_an_edited_one_in_the_sea
     assert (edited.cable.length, edited.cable.bending_stiffness, edited.environment.drag) == (1.0, 2e-3, 0.08)
     with pytest.raises(SceneError, match="a cable that yields"):
         opened.edited(draft.put(("cable", "yield_strain"), 0.01).put(("cable", "memory_rate"), 50.0))
+
+
+@pytest.fixture
+def two_windows() -> Tracked:
+    return Tracked.of(simulated(6, 10.0, cable=CABLE, environment=DRAG))
+
+
+def test_a_window_is_prepared_once_however_its_cable_is_edited(two_windows, monkeypatch):
+    draft = two_windows.draft()
+    monkeypatch.setattr(tracked, "Replay", None)  # no further one is made
+    stiffer = draft.put(("cable", "bending_stiffness"), 4e-3)
+    assert two_windows.edited(stiffer).draft().get(("cable", "bending_stiffness")) == 4e-3
+
+
+def test_a_window_is_prepared_beside_the_event_loop_and_the_last_chosen_is_shown(two_windows, monkeypatch):
+    threads, shown, prepare = [], [], Tracked.draft
+    monkeypatch.setattr(Tracked, "draft", lambda self: threads.append(get_ident()) or prepare(self))
+    monkeypatch.setattr(tracking, "opened", lambda *_: two_windows)
+
+    async def choose() -> None:
+        actions = TrackingActions(show=shown.append, draft=lambda: shown[-1], flush=MagicMock(), kept=MagicMock())
+        scene = Tracking(MagicMock(), MagicMock(), MagicMock(), MagicMock(), actions)
+        await scene.open("two.npz", b"")
+        for number in (1, 0, 1):
+            scene.window(number)
+            await asyncio.sleep(0)  # it is being prepared
+        while len(shown) < 2:
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(0.05)
+
+    asyncio.run(choose())
+    assert threads
+    assert get_ident() not in threads
+    first, second = (replace(two_windows, shown=k).draft().primitives for k in (0, 1))
+    assert first != second
+    assert [draft.primitives for draft in shown] == [first, second]
 
 
 def test_the_error_is_shown_at_the_cursor_and_over_time():
