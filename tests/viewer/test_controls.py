@@ -27,6 +27,7 @@ def checked(client: SceneClient) -> dict:
     return document
 
 
+ARC = [[0.1 * k, 0.01 * k * k] for k in range(11)]
 GRIPPER = ("primitives", 0)
 
 
@@ -117,6 +118,23 @@ def test_an_edited_target_error_leaves_the_rest_of_the_asked_quality_as_it_was_g
         client.set("Ask for", "grid")  # the method reference takes no grid
         assert "method" not in client.document["quality"]
         client.wait_for(lambda: "reference" not in client.control("Method")[1]["options"])
+
+
+@pytest.mark.parametrize(
+    ("label", "name", "value", "words", "other"),
+    [
+        ("Preset", "diameter", 0.004, "own values", "black-wire"),
+        ("Stress-free shape", "rest_shape", ARC, "as loaded", "straight"),
+    ],
+)
+def test_what_only_describes_the_cable_is_offered_only_while_it_does(service, label, name, value, words, other):
+    draft = start_draft().put(("cable",), {"preset": "red-wire"})
+    with connected(service) as client:
+        client.upload("Open a file …", "scene.json", json.dumps(draft.put(("cable", name), value).document).encode())
+        client.wait_for(lambda: client.control(label)[1]["value"] == words)
+        client.set(label, other)
+        client.wait_for(lambda: words not in client.control(label)[1]["options"])
+        assert client.document["cable"].get(name) != value
 
 
 def typed(client: SceneClient, label: str, texts: list[str], pause: float = 0.1) -> None:

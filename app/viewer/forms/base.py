@@ -14,6 +14,13 @@ def show_value(control: Any, value: Any) -> None:
         control.value = value
 
 
+def show_choice(control: Any, options: tuple[str, ...], value: str) -> None:
+    """Let a dropdown offer `options` and show `value`, unless it already does."""
+    if tuple(control.options) != options:
+        control.options = options
+    show_value(control, value)
+
+
 def show_if(control: Any, visible: bool) -> None:
     """Show or hide a control, unless it already is shown or hidden."""
     if control.visible != visible:

@@ -1,12 +1,12 @@
 """The form of the cable: its preset, its values, and what it remembers."""
 
-from typing import Any, Literal
+from typing import Any
 
 from viser import GuiApi
 
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.forms.base import Form, show_choice, show_if, show_value
 from app.viewer.kept import KeptCables
 from app.viewer.number_field import NumberField
 from app.viewer.shapes import scaled
@@ -14,7 +14,7 @@ from dlocore import PRESETS, Cable, SceneError
 from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
 
 CUSTOM = "own values"
-Rest = Literal["straight", "initial", "as loaded"]
+RESTS, LOADED = ("straight", "initial"), "as loaded"
 PLASTIC_RATE = 50.0  # 1/s, memory rate if a yield strain is set but no rate
 
 
@@ -26,7 +26,7 @@ class CableForm(Form):
         self._cables = cables
         self._kept = cables.all()
         with gui.add_folder("Cable"):
-            self._preset = gui.add_dropdown("Preset", (*PRESETS, *self._kept, CUSTOM))
+            self._preset = gui.add_dropdown("Preset", (*PRESETS, *self._kept))
             self._length = NumberField(gui, "Length [m]", 1.0, low=MIN_LENGTH, high=MAX_LENGTH)
             self._diameter = NumberField(gui, "Diameter [mm]", 1.0, low=0.01, high=5e5)
             self._density = NumberField(gui, "Density [g/m]", 1.0, low=0.01, high=1e7)
@@ -47,9 +47,7 @@ class CableForm(Form):
                     gui, "Yields at strain [%]", 0.0, low=0.0, high=1000.0, hint="In its outermost fibre; 0: never"
                 )
                 self._rate = NumberField(gui, "Memory rate [1/s]", PLASTIC_RATE, low=1e-3, high=1e9)
-                self._rest = gui.add_dropdown(
-                    "Stress-free shape", ("straight", "initial", "as loaded"), hint="initial: the start shape"
-                )
+                self._rest = gui.add_dropdown("Stress-free shape", RESTS, hint="initial: the start shape")
         self._bind(self._preset, self._with_preset)
         self._bind(self._length, lambda d: scaled(d, self._length.value))
         self._bind(self._diameter, lambda d: self._with(d, "diameter", 1e-3 * self._diameter.value))
@@ -66,7 +64,7 @@ class CableForm(Form):
         self._bind(self._stretch_damping, lambda d: self._with(d, "axial_damping", self._stretch_damping.value))
         self._bind(self._yield, lambda d: self._with_yield(d, 1e-2 * self._yield.value))
         self._bind(self._rate, lambda d: self._with(d, "memory_rate", self._rate.value))
-        self._bind(self._rest, self._with_rest)
+        self._bind(self._rest, lambda d: d.put(("cable", "rest_shape"), self._rest.value))
 
     @staticmethod
     def _with(draft: Draft, name: str, value: float) -> Draft:
@@ -79,7 +77,7 @@ class CableForm(Form):
             for key, value in kept["environment"].items():
                 draft = draft.put(("environment", key), value)
             return draft.put(("cable",), {**kept["cable"], **self._as_it_is(draft)})
-        return draft if name == CUSTOM else draft.put(("cable",), {**PRESETS[name].values, **self._as_it_is(draft)})
+        return draft.put(("cable",), {**PRESETS[name].values, **self._as_it_is(draft)})
 
     @staticmethod
     def _as_it_is(draft: Draft) -> dict[str, Any]:
@@ -103,18 +101,13 @@ class CableForm(Form):
     def offer(self) -> None:
         """Offer the cables that are kept now among the presets."""
         self._kept = self._cables.all()
-        self._preset.options = (*PRESETS, *self._kept, CUSTOM)
-        show_value(self._preset, preset_of(self._draft.get(("cable",), {}), self._kept))
+        self._take_preset(self._draft)
 
     def _with_yield(self, draft: Draft, strain: float) -> Draft:
         if strain <= 0.0:
             return draft.put(("cable", "yield_strain"), None).put(("cable", "memory_rate"), None)
         rate = draft.get(("cable", "memory_rate"), PLASTIC_RATE)
         return self._with(draft, "yield_strain", strain).put(("cable", "memory_rate"), rate)
-
-    def _with_rest(self, draft: Draft) -> Draft:
-        wanted = self._rest.value
-        return draft if wanted == "as loaded" else draft.put(("cable", "rest_shape"), wanted)
 
     def take(self, draft: Draft) -> None:
         """Show `draft` and the preset that it matches, if any; if it makes no cable, the controls stay as they are."""
@@ -123,7 +116,7 @@ class CableForm(Form):
             cable = draft.cable()
         except SceneError:
             return
-        show_value(self._preset, preset_of(draft.get(("cable",), {}), self._kept))
+        self._take_preset(draft)
         show_value(self._length, cable.length)
         show_value(self._diameter, _shown(1e3, cable.diameter))
         show_value(self._density, _shown(1e3, cable.linear_density))
@@ -144,11 +137,13 @@ class CableForm(Form):
         show_if(self._rate, cable.memory_rate is not None)
         self._take_rest(cable)
 
+    def _take_preset(self, draft: Draft) -> None:
+        presets, found = (*PRESETS, *self._kept), preset_of(draft.get(("cable",), {}), self._kept)
+        show_choice(self._preset, presets if found in presets else (*presets, CUSTOM), found)
+
     def _take_rest(self, cable: Cable) -> None:
-        rest: Rest = "as loaded"
-        if isinstance(cable.rest_shape, str):
-            rest = "initial" if cable.rest_shape == "initial" else "straight"
-        show_value(self._rest, rest)
+        rest = cable.rest_shape if isinstance(cable.rest_shape, str) else LOADED
+        show_choice(self._rest, RESTS if rest in RESTS else (*RESTS, LOADED), rest)
 
 
 def _shown(scale: float, value: float | None) -> float:

@@ -10,7 +10,7 @@ from viser import GuiApi
 from app.viewer import grips, report
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_content, show_if, show_value
+from app.viewer.forms.base import Form, show_choice, show_content, show_if, show_value
 from app.viewer.number_field import NumberField
 from app.viewer.wording import gripper_name
 from dlocore import SplineSurface
@@ -120,9 +120,7 @@ class GripperForm(Form):
         """Show `draft`."""
         self._draft = draft
         names = self._names(draft)
-        if tuple(self._which.options) != names:
-            self._which.options = names
-        show_value(self._which, names[min(draft.selected, len(names) - 1)])
+        show_choice(self._which, names, names[min(draft.selected, len(names) - 1)])
         held = grips.gripper(draft)
         path = {} if held is None else held["path"]
         moves = grips.moves(draft)
@@ -149,9 +147,7 @@ class GripperForm(Form):
         show_value(self._hold, next(words for words, name in HOLDS.items() if name == hold))
         motion = grips.motion(draft)
         options = ("moves", "stays", *(["follows waypoints"] if motion == "follows waypoints" else []))
-        if tuple(self._motion.options) != options:
-            self._motion.options = options
-        show_value(self._motion, motion)
+        show_choice(self._motion, options, motion)
         show_value(self._target, tuple(round(float(x), 4) for x in grips.target(draft, self._begin(draft))))
         show_value(self._turn, tuple(round(float(x), 2) for x in np.degrees(grips.turn(draft))))
         show_value(self._in_space, draft.in_space)

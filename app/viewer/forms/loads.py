@@ -7,7 +7,7 @@ from viser import GuiApi, GuiEvent
 from app.viewer import load_edits
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.forms.base import Form, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
 from dlocore.scene.cable import MAX_LENGTH
 
@@ -63,9 +63,7 @@ class LoadsForm(Form):
         self._draft = draft
         loads, names = load_edits.loads(draft), self._names(draft)
         self._chosen = max(0, min(self._chosen, len(loads) - 1))
-        if tuple(self._which.options) != names:
-            self._which.options = names
-        show_value(self._which, names[self._chosen])
+        show_choice(self._which, names, names[self._chosen])
         load = loads[self._chosen] if loads else None
         pull = None if load is None else load_edits.pull(load)
         for any_control in (self._which, self._u, self._remove):

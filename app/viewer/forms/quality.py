@@ -6,7 +6,7 @@ from viser import GuiApi
 
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.forms.base import Form, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
 
 Mode = Literal["automatic", "target error", "time budget", "grid"]
@@ -82,9 +82,7 @@ class QualityForm(Form):
 
     def _take_method(self, method: str, allowed: tuple[str, ...]) -> None:
         options = allowed if method in allowed else (*allowed, method)
-        if tuple(self._method.options) != options:
-            self._method.options = options
-        show_value(self._method, method)
+        show_choice(self._method, options, method)
 
     def _take_grid(self, given: dict[str, Any]) -> None:
         for control, name in ((self._n_u, "n_u"), (self._n_t, "n_t")):

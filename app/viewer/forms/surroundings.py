@@ -8,7 +8,7 @@ from viser import GuiApi, GuiEvent
 from app.viewer import obstacle_edits
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_if, show_value
+from app.viewer.forms.base import Form, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
 
 NONE = "no obstacle"
@@ -100,9 +100,7 @@ class SurroundingsForm(Form):
     def _take_obstacle(self, draft: Draft) -> None:
         bodies, names = obstacle_edits.obstacles(draft), self._names(draft)
         self._chosen = max(0, min(self._chosen, len(bodies) - 1))
-        if tuple(self._which.options) != names:
-            self._which.options = names
-        show_value(self._which, names[self._chosen])
+        show_choice(self._which, names, names[self._chosen])
         body = bodies[self._chosen] if bodies else {}
         for control in (self._which, self._centre, self._rough, self._remove):
             show_if(control, bool(bodies))
