@@ -47,7 +47,7 @@ def opened(draft: Draft, name: str, content: bytes) -> Draft:
     found = readers[suffix](content)
     if isinstance(found, dict):
         scene = Draft.of(found) if _has_form(found) else Draft(document=found)
-        scene.request()  # raises if it is no valid request
+        scene.cable()  # raises if it is no valid request, or its cable is impossible: the panel could not show it
         return Draft.of(found)
     return _along(draft, points_array("points", found))
 

@@ -98,6 +98,11 @@ def test_two_points_are_a_straight_cable_between_them():
         ("scene.json", b"{", "JSON"),
         ("scene.json", b'{"a": 1}', '"points"'),
         ("scene.json", json.dumps({"cable": {"length": -1}, "shape": {"kind": "straight"}}).encode(), "cable.length"),
+        (
+            "scene.json",
+            json.dumps({"cable": {"preset": "rope"}, "shape": {"kind": "straight"}}).encode(),
+            "cable.preset",
+        ),
         ("scene.json", json.dumps({"cable": {}, "shape": {}, "primitives": [3]}).encode(), "shape"),
         ("points.csv", b"1,2\n3,4\nfive,6", "line 3"),
         ("points.csv", b"1,2,3,4", "line 1"),
