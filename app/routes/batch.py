@@ -36,7 +36,7 @@ async def batch(
     """
     negotiated(request.headers.get("accept"), (LINES,))
     scenes = wanted.scenes()
-    check_size(len(scenes), service.settings.max_batch, "scenes")
+    check_size(len(scenes), service.settings.max_batch, wanted.field)
     service.check_ready()
     await service.check_known(wanted.root.like)
     service.worker.admit()

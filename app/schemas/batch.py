@@ -77,6 +77,11 @@ class BatchRequest(RootModel):
             raise PydanticCustomError("two_forms", "Two forms at once", context)
         return value
 
+    @property
+    def field(self) -> Literal["scenes", "primitives"]:
+        """The field whose entries are predicted."""
+        return "scenes" if isinstance(self.root, ScenesBatch) else "primitives"
+
     def scenes(self) -> list[Any]:
         """Return the requests as data."""
         if isinstance(self.root, ScenesBatch):

@@ -106,9 +106,7 @@ def _scene(service: Service, data: Any) -> tuple[PredictionRequest, Scene]:
 
 
 def check_size(count: int, most: int, field: str) -> None:
-    """Raise a 413 problem if a batch has more than `most` scenes."""
+    """Raise a 413 problem if a batch has more than `most` predictions, one for each entry of `field`."""
     if count > most:
-        detail = (
-            f"{field}: {count} scenes are more than the {most} that one batch may have. Send them in several batches."
-        )
+        detail = f"{field}: got {count}. Allowed: at most {most} in one batch. Send them in several batches."
         raise ProblemError(413, "batch-too-large", detail)

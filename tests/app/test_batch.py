@@ -133,7 +133,11 @@ def test_a_batch_has_a_bound(tmp_path: Path) -> None:
     with TestClient(create_app(Settings(data_dir=tmp_path, max_batch=2))) as client:
         start(client)
         assert client.post(BATCH, json={"scenes": [paper_scene()] * 2}).status_code == 200
-        the_problem(client.post(BATCH, json={"scenes": [paper_scene()] * 3}), 413)
+        problem = the_problem(client.post(BATCH, json={"scenes": [paper_scene()] * 3}), 413)
+        assert problem["detail"].startswith("scenes: got 3. Allowed: at most 2")
+        sweep = {"scene": paper_scene(), "primitives": [paper_scene()["primitives"]] * 4}
+        problem = the_problem(client.post(BATCH, json=sweep), 413)
+        assert problem["detail"].startswith("primitives: got 4. Allowed: at most 2")
         assert client.app.state.service.worker.admitted == 0  # type: ignore[attr-defined]
 
 
