@@ -5,10 +5,10 @@ from numpy.typing import NDArray
 
 from dlocore import Prediction
 from dlocore.effects.distance import distances
+from dlocore.effects.selfcontact import APART
 
 Floats = NDArray[np.float64]
 TOUCHING = 0.1  # of the diameter: a smaller gap between two surfaces counts as contact
-APART = 4.0  # diameters along the cable: points closer than this are not in contact with each other
 
 
 def contact_points(prediction: Prediction, points: Floats) -> Floats:

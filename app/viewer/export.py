@@ -9,12 +9,12 @@ import viser
 from viser import _messages
 
 from app.viewer.picture import Look, Picture
+from app.viewer.playback import REST_AT_END
 from app.viewer.quiet import quiet_console
 from dlocore import Prediction
 
 FRAMES = 30  # a second
 MOST_FRAMES = 600
-REST = 0.7  # s, pause at the end
 Pose = tuple[np.ndarray, np.ndarray]
 
 
@@ -47,7 +47,7 @@ def playback_page(prediction: Prediction, look: Look, camera: Pose, *, fov: floa
         for time in np.linspace(0.0, horizon, frames):
             picture.pose(float(time))
             serializer.insert_sleep(horizon / speed / frames)
-        serializer.insert_sleep(REST)
+        serializer.insert_sleep(REST_AT_END)
         return serializer.as_html().encode()
     finally:
         with quiet_console(), contextlib.suppress(RuntimeError):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-REST_AT_END = 0.7  # s, before the motion starts again
+REST_AT_END = 0.7  # s, pause before the motion starts again
 
 
 @dataclass
