@@ -1,7 +1,6 @@
 """What ``dlo study`` does."""
 
 import argparse
-import os
 import re
 import sys
 from collections.abc import Mapping
@@ -22,7 +21,6 @@ _GRID = re.compile(r"(\d+)[x×](\d+)")
 
 def study(options: argparse.Namespace) -> int:
     """Run a study, write and draw it, compare it with an earlier one, and print the results."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads of a linear algebra library would blur the times
     from dlocore.study import record
     from dlocore.study.compare import compare, words
     from dlocore.study.plan import StudyPlan

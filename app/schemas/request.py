@@ -146,11 +146,7 @@ _FRICTION: dict[str, Any] = {
 }
 
 
-def _holding(hold: str) -> dict[str, Any]:
-    return {**_HANGING, "primitives": [{**primitive, "hold": hold} for primitive in _HANGING["primitives"]]}
-
-
-TWO_GRIPPERS = _holding("tangent")
+TWO_GRIPPERS = {**_HANGING, "primitives": [{**grasp, "hold": "tangent"} for grasp in _HANGING["primitives"]]}
 EXAMPLES: dict[str, Example] = {
     "paper": {"summary": "The paper's Fig. 1: a straight cable on a table, one grasp", "value": PAPER},
     "two-grippers": {"summary": "A hanging cable between two grippers", "value": TWO_GRIPPERS},

@@ -45,7 +45,7 @@ class Metrics:
         self._seconds.labels(accuracy.method).observe(accuracy.wall_time)
 
     def ended(self, status: str, method: str) -> None:
-        """Count a solve without an answer by its status, such as "cancelled", and by the requested method."""
+        """Count a solve without an answer ("refused", "cancelled", "time_limit" or "failed") by requested method."""
         self._solves.labels(status, method).inc()
 
     def text(self) -> bytes:

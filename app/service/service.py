@@ -58,7 +58,7 @@ class Service:
     recent: Recent = field(default_factory=Recent)
     measurements: Measurements = field(default_factory=Measurements)
     searches: Searches = field(init=False)
-    ready: bool = field(default=False)
+    ready: bool = False
     compiled: bool = field(default_factory=is_compiled)
     _tasks: TaskGroup | None = field(init=False, default=None)
     _closed: anyio.Event = field(init=False, default_factory=anyio.Event)

@@ -13,12 +13,10 @@ from app.viewer.draft import Draft
 from app.viewer.programs import listed
 from dlocore import SplineSurface
 from dlocore.scene.paths import Profile
-from dlocore.scene.scene import Hold
 from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 Motion = Literal["moves", "stays", "follows waypoints"]
-HOLDS: tuple[Hold, ...] = get_args(Hold)
 PROFILES: tuple[Profile, ...] = get_args(Profile)
 DURATION = 1.5  # s, of a new motion
 REACH_SHARE = 0.9  # of the cable between two grippers: their distance after a target was brought within reach

@@ -344,9 +344,9 @@ class Panel:
         self._json.content = report.json_block(draft.document)
         self._curl.content = report.curl_block(self._address, draft.document)
 
-    def show_editing(self, editing: bool) -> None:
-        """Show whether the start shape is being dragged."""
-        show_value(self._editing, editing)
+    def end_editing(self) -> None:
+        """Show that the start shape is no longer being dragged."""
+        show_value(self._editing, False)
 
     def take_prediction(
         self,

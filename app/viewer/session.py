@@ -485,7 +485,7 @@ class Session:
         self._edits.finish()  # what was typed would go into the other scene
         self._history.close_step()
         self._shape.hide()
-        self._panel.show_editing(False)
+        self._panel.end_editing()
         self.edit(draft)
         self._history.close_step()
         self._reset_camera()

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -65,7 +65,7 @@ class _Course:
     repeats: int
     on_progress: OnProgress
     cancelled: Callable[[], bool]
-    done: int = field(default=0)
+    done: int = 0
 
     def next(self, what: str) -> None:
         if self.cancelled():

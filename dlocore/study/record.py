@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, TypeVar
@@ -127,7 +127,7 @@ class Study:
     runs: tuple[Run, ...]
     refused: tuple[str, ...] = ()
     scaling: tuple[Scaled, ...] = ()
-    effects: tuple[EffectCost, ...] = field(default=())
+    effects: tuple[EffectCost, ...] = ()
 
 
 class StudyError(DloError, ValueError):

@@ -1,6 +1,6 @@
 """The controls that edit a draft, in the units people use: mm, g/m, 10⁻³ N m², degrees."""
 
-from app.viewer.forms.base import ShowsDraft, show_if, show_value
+from app.viewer.forms.base import show_if, show_value
 from app.viewer.forms.cable import CableForm
 from app.viewer.forms.effects import EffectsForm
 from app.viewer.forms.gripper import GripperForm
@@ -14,7 +14,6 @@ __all__ = [
     "GripperForm",
     "LoadsForm",
     "QualityForm",
-    "ShowsDraft",
     "SurroundingsForm",
     "show_if",
     "show_value",

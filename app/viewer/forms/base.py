@@ -1,6 +1,6 @@
 """The common parts of all forms: controls that show a draft and change it."""
 
-from typing import Any, Protocol
+from typing import Any
 
 from viser import GuiEvent, GuiSliderHandle
 
@@ -56,10 +56,3 @@ class Form:
 def _beyond(control: Any) -> bool:
     """Return whether the number next to a slider is out of its range, as 0 is while 0.5 is typed."""
     return isinstance(control, GuiSliderHandle) and not control.min <= control.value <= control.max
-
-
-class ShowsDraft(Protocol):
-    """A form."""
-
-    def take(self, draft: Draft) -> None:
-        """Show `draft`."""
