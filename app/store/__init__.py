@@ -1,1 +1,1 @@
-"""Storage: runs and studies on disk, the latest predictions in memory."""
+"""Storage: runs, studies and kept cables on disk, the latest predictions in memory."""

@@ -13,9 +13,9 @@ from fastapi import FastAPI
 from viser import ClientHandle, _messages
 
 from app.service.service import Service
+from app.store.cables import KeptCables
 from app.viewer.draft import Draft
 from app.viewer.gateway import ADDRESS_HEADER, BEGIN_HEADER, KEY_HEADER, RUN, TAB_HEADER, Upstream
-from app.viewer.kept import KeptCables
 from app.viewer.quiet import quiet_console
 from app.viewer.session import Session, Shared, Work, of_example, of_run
 from app.viewer.solver import ServiceSolver

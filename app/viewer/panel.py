@@ -9,13 +9,13 @@ import viser
 from viser import ClientHandle, GuiEvent
 
 from app.pages.gallery import examples
+from app.store.cables import KeptCables
 from app.viewer import report
 from app.viewer.costs import Costs
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms import CableForm, EffectsForm, GripperForm, LoadsForm, QualityForm, SurroundingsForm, show_value
 from app.viewer.forms.recording import RecordingActions, RecordingForm
-from app.viewer.kept import KeptCables
 from app.viewer.palette import QUANTITIES, ColourScale
 from app.viewer.picture import SURFACE_STYLES, Look
 from app.viewer.playback import Playback

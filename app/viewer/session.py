@@ -11,6 +11,7 @@ from viser import ClientHandle, SceneClickEvent
 from viser._messages import GuiUpdateMessage
 
 from app.pages.gallery import examples
+from app.store.cables import KeptCables
 from app.viewer import grips, report, uploads
 from app.viewer.camera import FIELD_OF_VIEW, PHONE, extent, start_pose
 from app.viewer.draft import Draft, start_draft
@@ -18,7 +19,6 @@ from app.viewer.edits import Edits
 from app.viewer.forms.recording import RecordingActions
 from app.viewer.gizmo import Gizmo
 from app.viewer.history import History
-from app.viewer.kept import KeptCables
 from app.viewer.outbox import Outbox, Runs
 from app.viewer.palette import BRAND
 from app.viewer.panel import TO_READ, Actions, Panel

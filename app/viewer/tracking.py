@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from app.http.problems import ProblemError
+from app.store.cables import KeptCables
 from app.viewer import report
 from app.viewer import tracking_report as say
 from app.viewer.draft import Draft
 from app.viewer.forms.recording import RecordingForm
-from app.viewer.kept import KeptCables
 from app.viewer.solving import Solver
 from app.viewer.tracked import MOST_WINDOWS, Tracked, opened
 from dlocore import Prediction, SceneError
@@ -226,7 +226,7 @@ class Tracking:
         drag = {key: draft.get(("environment", key), 0.0) for key in ("drag", "drag_quadratic")}
         try:
             self._cables.keep(name, draft.get(("cable",), {}), drag)
-        except (ProblemError, OSError) as error:
+        except (SceneError, OSError) as error:
             self._form.say(f"Not kept: {error}", good=False)
             return
         self._form.say(f"{name.strip()} is now among the presets of the cable.", good=True)

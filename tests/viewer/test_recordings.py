@@ -13,8 +13,9 @@ import pytest
 from protocol_client import SceneClient, connected
 
 from app.service import searches
+from app.store import cables
+from app.store.cables import FILE, KeptCables
 from app.viewer import tracked, tracking
-from app.viewer.kept import FILE, KeptCables
 from app.viewer.tracked import Tracked
 from app.viewer.tracking import Tracking, TrackingActions
 from app.viewer.tracking_report import error_card
@@ -197,3 +198,16 @@ def test_kept_cables_outlive_the_service_and_a_damaged_file(tmp_path):
     assert KeptCables(tmp_path).all() == expected
     (tmp_path / FILE).write_text("{")
     assert KeptCables(tmp_path).all() == {}
+
+
+def test_a_cable_is_kept_only_under_a_name_that_tells_it_from_others_and_only_so_many_are(tmp_path, monkeypatch):
+    monkeypatch.setattr(cables, "MOST", 1)
+    kept = KeptCables(tmp_path)
+    for name in ("  ", "x" * 61, "paper"):
+        with pytest.raises(SceneError, match=r"Allowed: 1 to 60 characters, and no name of a preset of the library\."):
+            kept.keep(name, {}, {})
+    kept.keep("one", {}, {})
+    kept.keep("one", {"diameter": 0.01}, {})
+    with pytest.raises(SceneError, match=r"name: got .two.\. Allowed: the name of one of the 1 cables"):
+        kept.keep("two", {}, {})
+    assert list(kept.all()) == ["one"]

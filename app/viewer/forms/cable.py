@@ -4,10 +4,10 @@ from typing import Any
 
 from viser import GuiApi
 
+from app.store.cables import KeptCables
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_choice, show_if, show_value
-from app.viewer.kept import KeptCables
 from app.viewer.number_field import NumberField
 from app.viewer.shapes import scaled
 from dlocore import PRESETS, Cable, SceneError

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from app.http.problems import ProblemError
 from app.schemas.cable import CableModel
+from dlocore import PRESETS, SceneError
 from dlocore.files import write_whole
 
 LONGEST_NAME = 60
@@ -46,16 +46,18 @@ class KeptCables:
         """Keep a cable under a name; it replaces a cable kept under the same name.
 
         Raises:
-            ProblemError: the name is empty or too long, or there are too many.
+            SceneError: the name is empty, too long or that of a preset of the library, or there are too many cables.
             OSError: the file can't be written.
         """
         name = name.strip()
-        if not 0 < len(name) <= LONGEST_NAME:
-            raise ProblemError(422, "preset-name", f"A name of 1 to {LONGEST_NAME} characters is needed.")
+        if not 0 < len(name) <= LONGEST_NAME or name in PRESETS:
+            raise SceneError(
+                "name", repr(name), f"1 to {LONGEST_NAME} characters, and no name of a preset of the library"
+            )
         with self._lock:
             kept = self.all()
             if name not in kept and len(kept) >= MOST:
-                raise ProblemError(422, "too-many-presets", f"{MOST} cables are kept already.")
+                raise SceneError("name", repr(name), f"the name of one of the {MOST} cables that are kept already")
             values = {key: value for key, value in cable.items() if key not in _OF_A_PIECE and value is not None}
             kept[name] = {"cable": values, "environment": dict(environment)}
             self._path.parent.mkdir(parents=True, exist_ok=True)
