@@ -112,8 +112,8 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     document = await anyio.to_thread.run_sync(store_of(service).document, id)
     if document is not None:
         return Response(document, media_type=JSON)
-    job = service.measurements.get(id)
-    if job is None or job.kind != KIND:
+    job = service.measurements.get(KIND, id)
+    if job is None:
         raise _no_study(id)
     if job.state == "done":  # it ended after the search for its document
         return Response(job.document, media_type=JSON)
@@ -129,13 +129,12 @@ async def read(id: str, request: Request, service: TheService) -> Response:
 )
 async def remove(id: str, service: TheService) -> Response:
     """Stop the study if it is running or waiting (200, or 202 while it is still stopping), or remove it (204)."""
-    job = service.measurements.get(id)
-    mine = job is not None and job.kind == KIND
-    if mine and job is not None and not job.finished.is_set():
+    job = service.measurements.get(KIND, id)
+    if job is not None and not job.finished.is_set():
         await job.stop()
         if job.state != "done":
             return json_response(job.summary(), 200 if job.finished.is_set() else 202)
-    known = mine and service.measurements.forget(id)
+    known = job is not None and service.measurements.forget(id)
     if not await anyio.to_thread.run_sync(store_of(service).delete, id) and not known:
         raise _no_study(id)
     return Response(status_code=204)
@@ -154,8 +153,8 @@ async def follow(
     """
     negotiated(request.headers.get("accept"), (EVENTS,))
     seen = events.seen_before(last_event_id)
-    job = service.measurements.get(id)
-    if job is not None and job.kind == KIND:
+    job = service.measurements.get(KIND, id)
+    if job is not None:
         return events.of_job(job, seen)
     document = await anyio.to_thread.run_sync(store_of(service).document, id)
     if document is None:

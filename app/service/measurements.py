@@ -84,9 +84,10 @@ class Measurements:
         self._kept[id] = measurement
         return measurement
 
-    def get(self, id: str) -> Measurement | None:
-        """Return a measurement, or None."""
-        return self._kept.get(id)
+    def get(self, kind: str, id: str) -> Measurement | None:
+        """Return a measurement of a kind, or None."""
+        found = self._kept.get(id)
+        return found if found is not None and found.kind == kind else None
 
     def forget(self, id: str) -> bool:
         """Forget a measurement; return whether it was there."""
