@@ -289,7 +289,10 @@ def sensitivities(prediction: Prediction, wrt: Sequence[str]) -> Sensitivities:
     objected = objection(problem, motion)
     known, coarse = None, COARSE_STEP
     if not objected and not scene.shape.settle:
-        known = factored(problem, motion)
+        try:
+            known = factored(problem, motion)
+        except ValueError as error:
+            objected = str(error)
     elif not objected:
         coarse = SETTLED_STEP
         objected = (

@@ -70,7 +70,7 @@ def found() -> np.ndarray:
     return sensed(U, T)
 
 
-def test_the_gripper_moves_with_its_displacement(found: np.ndarray) -> None:
+def test_the_gripper_moves_with_its_displacement() -> None:
     sensed = sensitivities(predict(scene()), ["grasps[0].path.displacement[1]"])
     x = T / 1.5
     expected = x**3 * (10 - 15 * x + 6 * x**2)  # minimum jerk; the time spline of 15 control points misses 1e-3 of it
@@ -94,6 +94,16 @@ def test_derivatives_are_those_of_marches_solved_to_rounding(
     difference = by_differences(scene(), NAMES[index])
     scale = np.abs(difference).max()  # the largest derivative
     np.testing.assert_allclose(found[index], difference, atol=2e-5 * scale)
+
+
+def test_where_a_step_is_singular_whole_marches_are_compared(
+    found: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sensitivity, "factor_steps", lambda *_: -1)
+    sensed = sensitivities(predict(scene()), ["environment.drag"])
+    assert sensed.reason == ("the tangent of a step is singular",)
+    known = found[NAMES.index("environment.drag")]
+    np.testing.assert_allclose(sensed(U, T)[0], known, atol=1e-3 * np.abs(known).max())
 
 
 @pytest.mark.parametrize("name", ["cable.axial_damping", "cable.axial_stiffness", "grasps[0].path.displacement[1]"])
