@@ -35,15 +35,16 @@ class PointMassModel(Model):
 class CableModel(Model):
     """A cable of round section. `length`, `diameter` and `linear_density` are required unless `preset` gives them.
 
-    Give either the stiffnesses or the moduli. Moduli are converted as for a solid round section: EA = E pi D^2/4,
-    EI = E pi D^4/64, GJ = G pi D^4/32. This is right for solid rods only, because the strands of a cable slide on each
-    other: with the modulus of copper, a diameter of 6 mm gives an EI of 7 N m^2; measured wires of that size have 1e-4
-    to 1e-3.
+    Give either the stiffnesses or the moduli; a modulus beside all the stiffnesses that it gives is refused. Moduli are
+    converted as for a solid round section: EA = E pi D^2/4, EI = E pi D^4/64, GJ = G pi D^4/32. This is right for solid
+    rods only, because the strands of a cable slide on each other: with the modulus of copper, a diameter of 6 mm gives
+    an EI of 7 N m^2; measured wires of that size have 1e-4 to 1e-3.
     """
 
     preset: str | None = Field(
         default=None,
-        description="Name of a preset (`GET /v1/cables`); other fields given here override its values.",
+        description="Name of a preset (`GET /v1/cables`); other fields given here override its values, and moduli the "
+        "stiffnesses that they give.",
         examples=list(PRESETS)[:2],
     )
     length: Number | None = Field(
@@ -54,8 +55,8 @@ class CableModel(Model):
     bending_stiffness: Number | None = _positive("Bending stiffness EI", "N m^2", 1e-3)
     axial_stiffness: Number | None = _positive("Axial stiffness EA", "N", 640.0)
     torsional_stiffness: Number | None = _positive("Torsional stiffness GJ", "N m^2", 1e-3)
-    youngs_modulus: Number | None = _positive("Young's modulus E; gives EA and EI if they are absent", "Pa", 2e7)
-    shear_modulus: Number | None = _positive("Shear modulus G; gives GJ if it is absent", "Pa", 7e6)
+    youngs_modulus: Number | None = _positive("Young's modulus E; gives EA and EI, whichever is absent", "Pa", 2e7)
+    shear_modulus: Number | None = _positive("Shear modulus G; gives GJ, which has to be absent", "Pa", 7e6)
     bending_damping: Number = Field(
         default=0.0, ge=0.0, description="Internal damping on the rate of curvature [N m^2 s].", examples=[1e-4]
     )

@@ -12,6 +12,14 @@ from dlocore.scene.points import points_along
 
 MIN_LENGTH, MAX_LENGTH = 0.01, 1000.0  # [m]
 MAX_POINT_MASSES = 32
+_UNITS = {
+    "bending_stiffness": "N m^2", "axial_stiffness": "N", "torsional_stiffness": "N m^2", "youngs_modulus": "Pa",
+    "shear_modulus": "Pa",
+}  # fmt: skip
+STIFFNESSES = {  # that each modulus gives
+    "youngs_modulus": ("bending_stiffness", "axial_stiffness"),
+    "shear_modulus": ("torsional_stiffness",),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +56,8 @@ class Cable(Checked):
 
     Defaults are stored as numbers: `dataclasses.replace(cable, bending_stiffness=...)` leaves EA, GJ and the axial
     damping as they were. To derive them anew, also pass `axial_stiffness=None`, `torsional_stiffness=None` and
-    `axial_damping=None`.
+    `axial_damping=None`. Moduli are converted to stiffnesses and not stored. To replace one, also pass None for the
+    stiffnesses that it gives.
 
     Args:
         length: L [m], 0.01 to 1000.
@@ -57,8 +66,8 @@ class Cable(Checked):
         bending_stiffness: EI [N m^2].
         axial_stiffness: EA [N].
         torsional_stiffness: GJ [N m^2].
-        youngs_modulus: E [Pa].
-        shear_modulus: G [Pa].
+        youngs_modulus: E [Pa], for EI and EA, whichever is not given.
+        shear_modulus: G [Pa], for GJ.
         bending_damping: internal damping on the rate of curvature [N m^2 s].
         torsional_damping: internal damping on the rate of twist [N m^2 s].
         axial_damping: eta_e, internal damping on the rate of the axial strain [N s]; with 0, waves of stretch persist.
@@ -74,8 +83,8 @@ class Cable(Checked):
         point_masses: attached parts, such as a connector at an end.
 
     Raises:
-        SceneError: a value is missing, not finite or out of range; the points of `rest_shape` are too few or all the
-            same.
+        SceneError: a value is missing, not finite or out of range; a modulus is given with all the stiffnesses that it
+            gives; the points of `rest_shape` are too few or all the same.
     """
 
     length: float
@@ -106,10 +115,10 @@ class Cable(Checked):
         put("length", length)
         put("diameter", diameter)
         put("linear_density", number("linear_density", self.linear_density, above=0.0, at_most=1e4, unit="kg/m"))
-        optional = ("bending_stiffness", "axial_stiffness", "torsional_stiffness", "youngs_modulus", "shear_modulus")
-        for name in optional:
+        for name, unit in _UNITS.items():
             if getattr(self, name) is not None:
-                put(name, number(name, getattr(self, name), above=0.0, at_most=1e15))
+                put(name, number(name, getattr(self, name), above=0.0, at_most=1e15, unit=unit))
+        self._check_moduli()
         if self.bending_stiffness is None:
             if self.youngs_modulus is None:
                 raise SceneError("bending_stiffness", None, "EI [N m^2], or youngs_modulus [Pa]", "It is missing")
@@ -124,6 +133,8 @@ class Cable(Checked):
                 "torsional_stiffness",
                 self.bending_stiffness if modulus is None else modulus * math.pi * diameter**4 / 32,
             )
+        put("youngs_modulus", None)
+        put("shear_modulus", None)
         put("bending_damping", number("bending_damping", self.bending_damping, at_least=0.0, unit="N m^2 s"))
         put("torsional_damping", number("torsional_damping", self.torsional_damping, at_least=0.0, unit="N m^2 s"))
         axial_damping = self.axial_damping
@@ -152,6 +163,13 @@ class Cable(Checked):
             if not one.u <= length:
                 raise SceneError(f"point_masses[{i}].u", one.u, f"0 to the cable's length, {length:g} [m]")
 
+    def _check_moduli(self) -> None:
+        """Refuse a modulus that changes nothing, because all the stiffnesses that it gives are given."""
+        for modulus, stiffnesses in STIFFNESSES.items():
+            if getattr(self, modulus) is not None and all(getattr(self, name) is not None for name in stiffnesses):
+                both = " and ".join(stiffnesses)
+                raise SceneError(modulus, getattr(self, modulus), f"either {modulus}, or {both}", "Both are given")
+
     @property
     def yields(self) -> bool:
         """Whether a yield strain is given, so that the cable may keep bends, twist or stretch."""
@@ -169,7 +187,7 @@ class Cable(Checked):
 
     @staticmethod
     def preset(name: str, **overrides: Any) -> "Cable":
-        """Return the preset `name` with the given fields replaced.
+        """Return the preset `name` with the given fields replaced; a modulus replaces the stiffnesses that it gives.
 
         Raises:
             SceneError: no such preset or field.
@@ -178,7 +196,9 @@ class Cable(Checked):
         unknown = set(overrides) - {f.name for f in fields(Cable)}
         if unknown:
             raise SceneError(sorted(unknown)[0], overrides[sorted(unknown)[0]], "a field of Cable")
-        return Cable(**{**PRESETS[name].values, **overrides})
+        given = [modulus for modulus in STIFFNESSES if overrides.get(modulus) is not None]
+        replaced = dict.fromkeys(stiffness for modulus in given for stiffness in STIFFNESSES[modulus])
+        return Cable(**{**PRESETS[name].values, **replaced, **overrides})
 
 
 @dataclass(frozen=True)

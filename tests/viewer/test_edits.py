@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from app.schemas.request import EXAMPLES
 from app.viewer import grips, obstacle_edits, plots, report
 from app.viewer.draft import Draft, start_draft
-from app.viewer.forms.cable import CUSTOM, preset_of
+from app.viewer.forms.cable import CUSTOM, CableForm, preset_of
 from app.viewer.palette import ramp
 from app.viewer.picking import NEAR_CABLE, CableClick, GripperClick, picked
 from dlocore import PRESETS, SceneError, predict
@@ -115,6 +115,16 @@ def test_a_number_that_is_not_allowed_is_named_with_what_is():
         draft.scene(NOTHING_STORED)
     assert refused.value.field == "cable.diameter"
     assert refused.value.allowed
+
+
+def test_a_stiffness_that_is_set_takes_the_place_of_its_modulus():
+    cable = {"length": 1.0, "diameter": 0.006, "linear_density": 0.05, "youngs_modulus": 2e7, "shear_modulus": 7e6}
+    draft = CableForm._with(start_draft().put(("cable",), cable), "bending_stiffness", 1e-3)
+    assert draft.get(("cable", "youngs_modulus")) == 2e7  # it gives EA
+    for name in ("axial_stiffness", "torsional_stiffness"):
+        draft = CableForm._with(draft, name, 2.0)
+    assert not {"youngs_modulus", "shear_modulus"} & set(draft.get(("cable",)))
+    assert draft.cable().axial_stiffness == 2.0
 
 
 @pytest.mark.parametrize("name", list(PRESETS))

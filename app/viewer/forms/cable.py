@@ -11,7 +11,7 @@ from app.viewer.forms.base import Form, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
 from app.viewer.shapes import scaled
 from dlocore import PRESETS, Cable, SceneError
-from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
+from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH, STIFFNESSES
 
 CUSTOM = "own values"
 RESTS, LOADED = ("straight", "initial"), "as loaded"
@@ -68,7 +68,11 @@ class CableForm(Form):
 
     @staticmethod
     def _with(draft: Draft, name: str, value: float) -> Draft:
-        return draft.put(("cable", name), float(f"{value:.9g}"))
+        draft = draft.put(("cable", name), float(f"{value:.9g}"))
+        for modulus, stiffnesses in STIFFNESSES.items():
+            if all(draft.get(("cable", stiffness)) is not None for stiffness in stiffnesses):
+                draft = draft.put(("cable", modulus), None)  # refused beside all that it gives
+        return draft
 
     def _with_preset(self, draft: Draft) -> Draft:
         name = self._preset.value
