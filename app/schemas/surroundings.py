@@ -127,14 +127,15 @@ class QualityModel(Model):
     keep_grid: Flag = Field(
         default=False,
         description="Whether to keep the result of a given grid, and of a requested least squares, whatever its error "
-        "is and whether or not it converges.",
+        "is and whether or not it converges. Only with a given grid.",
         examples=[False],
     )
     delta: Number | None = Field(
         default=None,
         ge=1e-10,
         le=1e-2,
-        description="Threshold on the control-point update of a least squares [m]; absent: 1e-5.",
+        description="Threshold on the control-point update of a least squares [m]; absent: 1e-5. Only with a given "
+        "grid.",
         examples=[1e-5],
     )
     target_error: Number | None = Field(

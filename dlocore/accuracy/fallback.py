@@ -58,7 +58,7 @@ def more_in_time(found: Prediction) -> Quality | None:
 def free_grids(scene: Scene) -> Quality:
     """Return the quality to request if a given grid can't show the motion: finer grids that agree to AUTO_ENOUGH."""
     target = AUTO_ENOUGH * scene.cable.length
-    return replace(scene.quality, n_u=None, n_t=None, target_error=target, method="march")
+    return Quality(target_error=target, method="march")
 
 
 def as_marched(level: Level) -> Level:

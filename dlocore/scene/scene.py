@@ -354,15 +354,15 @@ class Quality:
             so. That takes as long as a `target_error` of 1 %; if no grid resolves the motion, a minute or more. A
             deadline limits it, and `keep_grid` leaves it out.
         delta: threshold of a least squares on the norm of its control-point update, paper eq. (25) [m], 1e-10 to 1e-2;
-            None: 1e-5.
+            None: 1e-5. Only with a given grid.
         method: "march", "spacetime", "paper", "reference" (docs/reference.md) or "auto". "auto" is `march`, which on
             the same grid is nearer to the motion and takes less time. It is `spacetime` if a grid is given with a
             `delta`, which a march does not use, and the motion is smooth. If `spacetime` does not converge, `march` is
             the last resort, and `message` says so.
         estimate: with a given grid, estimate the error by a second march on another grid. False saves that time; a
-            solve that converges is then the answer, however large its error.
+            solve that converges is then the answer, however large its error. Only with a given grid.
         keep_grid: keep the answer of the given grid and of a requested least squares, however large its error, and
-            whether it converges or not. For those who measure grids and methods.
+            whether it converges or not. For those who measure grids and methods. Only with a given grid.
     """
 
     n_u: int | None = None
@@ -400,8 +400,9 @@ class Quality:
             raise SceneError(
                 given[1], getattr(self, given[1]), "only one of n_u with n_t, target_error and time_budget"
             )
-        if self.keep_grid and self.n_u is None:
-            raise SceneError("keep_grid", True, "n_u and n_t given with it")
+        for name, without in (("delta", None), ("estimate", True), ("keep_grid", False)):
+            if self.n_u is None and getattr(self, name) != without:
+                raise SceneError(name, getattr(self, name), "n_u and n_t given with it")
         if self.method in ("spacetime", "paper") and self.n_u is None:
             raise SceneError("method", self.method, "n_u and n_t given with it")
         if self.method == "reference" and (self.n_u is not None or self.time_budget is not None):

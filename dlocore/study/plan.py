@@ -79,7 +79,7 @@ class StudyPlan:
                 raise SceneError("grids", f"{n_u}x{n_t}", f"for {error.field} {error.allowed}") from None
         for delta in self.deltas:
             try:
-                Quality(delta=delta)
+                Quality(n_u=n_u, n_t=n_t, delta=delta)
             except SceneError as error:
                 raise SceneError("deltas", delta, error.allowed) from None
         if self.count > MAX_RUNS:

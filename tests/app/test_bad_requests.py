@@ -144,6 +144,8 @@ CASES: list[tuple[dict[str, Any], str, Any, str]] = [
     (PAPER, "primitives.0.path.rotation", [0, 0, 1], "primitives[0].path.rotation"),
     (PAPER, "quality", {"n_u": 9}, "quality.n_t"),
     (PAPER, "quality", {"target_error": 1e-3, "time_budget": 1}, "quality.time_budget"),
+    (PAPER, "quality", {"target_error": 1e-3, "delta": 1e-5}, "quality.delta"),
+    (PAPER, "cable.shear_modulus", 7e6, "cable.shear_modulus"),
     (PAPER, "shape.velocity", {"kind": "control_points", "control_points": [[0, 0, 0]] * 4}, "shape.velocity.kind"),
     (PAPER, "shape.velocity", [0, 1], "shape.velocity"),
     (PAPER, "shape.velocity", {"kind": "wind"}, "shape.velocity.kind"),

@@ -186,7 +186,10 @@ BAD: list[tuple[str, Callable[[], object]]] = [
     ("n_u", lambda: Quality(n_u=9.0, n_t=13)),  # type: ignore[arg-type]
     ("n_t", lambda: Quality(n_u=9, n_t=514)),
     ("n_t", lambda: Quality(n_u=9)),
-    ("delta", lambda: Quality(delta=0.0)),
+    ("delta", lambda: Quality(n_u=9, n_t=13, delta=0.0)),
+    ("delta", lambda: Quality(delta=1e-5)),
+    ("estimate", lambda: Quality(target_error=1e-3, estimate=False)),
+    ("keep_grid", lambda: Quality(time_budget=1.0, keep_grid=True)),
     ("target_error", lambda: Quality(target_error=-1.0)),
     ("time_budget", lambda: Quality(time_budget=NAN)),
     ("time_budget", lambda: Quality(target_error=1e-3, time_budget=1.0)),

@@ -19,7 +19,6 @@ def test_auto_is_a_march_unless_a_given_grid_has_a_threshold():
     for quality, method in (
         (Quality(n_u=9, n_t=13), "march"),
         (Quality(n_u=9, n_t=13, delta=1e-5), "spacetime"),
-        (Quality(delta=1e-5), "march"),
     ):
         scene = paper_scene(0.25, quality=quality)
         assert predict(scene).accuracy.method == plan(scene).method == method

@@ -108,12 +108,12 @@ def test_every_scene_control_changes_the_scene(service, changes, path, expected)
 
 
 def test_an_edited_target_error_leaves_the_rest_of_the_asked_quality_as_it_was_given(service):
-    draft = start_draft().put(("quality",), {"target_error": 0.02, "method": "reference", "delta": 1e-6})
+    draft = start_draft().put(("quality",), {"target_error": 0.02, "method": "reference", "keep_grid": False})
     with connected(service) as client:
         client.upload("Open a file …", "scene.json", json.dumps(draft.document).encode())
         client.wait_for(lambda: client.control("Method")[1]["value"] == "reference")
         client.set("Target error [mm]", 30.0)
-        assert client.document["quality"] == {"target_error": 0.03, "method": "reference", "delta": 1e-6}
+        assert client.document["quality"] == {"target_error": 0.03, "method": "reference", "keep_grid": False}
         client.wait_for(lambda: "reference," in client.card, timeout=60)
         client.set("Ask for", "grid")  # the method reference takes no grid
         assert "method" not in client.document["quality"]
