@@ -13,9 +13,10 @@ import numpy as np
 
 from dlocore.compiling.caching import is_kept
 from dlocore.compiling.interrupts import interruptible
-from dlocore.errors import Cancelled
+from dlocore.errors import Cancelled, whole
 from dlocore.front import predict
 from dlocore.kernels.march import march_steps
+from dlocore.machine import usable_cores
 from dlocore.prediction import Prediction
 from dlocore.problem.problem import pose
 from dlocore.problem.strands import nearest_strands
@@ -27,6 +28,7 @@ from dlocore.sensitivity import sensitivities
 from dlocore.spline import uniform_knots
 from dlocore.statics.statics import equilibrium
 
+_MOST_PROCESSES = 1024
 U = np.linspace(0.0, 1.0, 12)[:, None]
 ARC = Points(points=U * [1.0, 0.0, 0.0] + 0.05 * np.sin(3.0 * U) * [0.0, 1.0, 0.0])
 MOVE = Move(displacement=(0.0, 0.01, 0.0), rotation=(0.0, 0.0, 0.1), duration=1.0)
@@ -45,16 +47,17 @@ def warm_up(processes: int | None = None, cancelled: Callable[[], bool] | None =
     """Compile, or load from the cache, every kernel, so that the first prediction is as fast as the next.
 
     Args:
-        processes: how many processes compile at once if nothing is compiled yet; by default one per core.
+        processes: how many processes compile at once if nothing is compiled yet, 1 to 1024; by default one for each
+            core that this process may use.
         cancelled: called ten times a second while they compile, and between the parts that are loaded; the warm-up
             stops if it returns True.
 
     Raises:
-        ValueError: fewer than one process.
+        SceneError: `processes` is not such a number.
         Cancelled: `cancelled` returned True.
     """
-    if processes is not None and processes < 1:
-        raise ValueError(f"processes: got {processes}. Allowed: at least 1.")
+    if processes is not None:
+        processes = whole("processes", processes, at_least=1, at_most=_MOST_PROCESSES)
 
     def check() -> None:
         if cancelled is not None and cancelled():
@@ -62,7 +65,7 @@ def warm_up(processes: int | None = None, cancelled: Callable[[], bool] | None =
 
     by_python = Path(sys.executable or "").name.startswith("python")  # not a program that embeds Python
     if by_python and not is_compiled():
-        _compile_in_processes(processes or os.cpu_count() or 1, check)
+        _compile_in_processes(processes or usable_cores(), check)
     for part in PARTS.values():
         check()
         part()

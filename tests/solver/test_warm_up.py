@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from dlocore import Cancelled, warm_up, warming
+from dlocore import Cancelled, SceneError, warm_up, warming
 
 PROGRAM = """
 import sys
@@ -139,7 +139,17 @@ def test_a_cancelled_warm_up_ends_what_it_has_begun(
     assert [share.returncode for share in shares] == [-signal.SIGKILL] * 2
 
 
-@pytest.mark.parametrize("processes", [0, -1])
-def test_it_takes_one_process_at_least(processes: int) -> None:
-    with pytest.raises(ValueError, match="processes"):
+@pytest.mark.parametrize("processes", [0, -1, 1.5, "2", True, 10_000])
+def test_it_takes_a_number_of_processes(processes: Any) -> None:
+    with pytest.raises(SceneError, match="processes"):
         warm_up(processes)
+
+
+def test_one_process_is_started_for_each_core_that_may_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[int] = []
+    monkeypatch.setattr(warming, "is_compiled", lambda: False)
+    monkeypatch.setattr(warming, "usable_cores", lambda: 3)
+    monkeypatch.setattr(warming, "_compile_in_processes", lambda at_once, check: started.append(at_once))
+    monkeypatch.setattr(warming, "PARTS", {})
+    warm_up()
+    assert started == [3]
