@@ -20,7 +20,7 @@ from dlocore.answer.parts import (
     with_notes,
 )
 from dlocore.compiling.interrupts import interruptible
-from dlocore.errors import number
+from dlocore.errors import instance, number
 from dlocore.pickling import state_with
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville, nearest_line
@@ -224,11 +224,18 @@ def continued(
 ) -> ControlPoints:
     """Return the cable of a predicted motion at time `t` [s], its last by default, as the start of another motion.
 
-    Without `stretch`, for example if it was not stored, the cable continues with its own length.
+    Args:
+        surface: the predicted motion.
+        material: how its sections are turned and what they remember; None: nothing is known of them.
+        t: time [s].
+        stretch: its axial strain; None, for example if it was not stored: the cable continues with its own length.
 
     Raises:
-        SceneError: `t` is outside the predicted time.
+        SceneError: `t` is outside the predicted time, or an argument is of another type.
     """
+    instance("surface", surface, SplineSurface, "a SplineSurface")
+    instance("material", material, MaterialMotion | None, "a MaterialMotion, or None")
+    instance("stretch", stretch, StretchMotion | None, "a StretchMotion, or None")
     at = surface.horizon if t is None else number("t", t, at_least=0.0, at_most=surface.horizon, unit="s")
     control, velocity = (surface.states(at, order)[0] for order in (0, 1))
     strain = None

@@ -16,7 +16,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.array_files import ArrayFile
-from dlocore.errors import MILLIMETRES, SceneError, array, instances, number, repeated, unmasked, whole, within
+from dlocore.errors import (
+    MILLIMETRES,
+    SceneError,
+    array,
+    instance,
+    instances,
+    number,
+    repeated,
+    unmasked,
+    whole,
+    within,
+)
 from dlocore.pickling import Checked
 from dlocore.scene.cable import PointMass
 from dlocore.words import counted
@@ -111,9 +122,9 @@ class Recording(Checked):
             length = number("length", self.length, at_most=1e3, unit="m", **least)
         put("u", _no_longer(u, length))
         put("length", length)
-        for name in ("diameter", "linear_density"):
+        for name, unit in (("diameter", "m"), ("linear_density", "kg/m")):
             if getattr(self, name) is not None:
-                put(name, number(name, getattr(self, name), above=0.0, at_most=1e4))
+                put(name, number(name, getattr(self, name), above=0.0, at_most=1e4, unit=unit))
         put("point_masses", instances("point_masses", self.point_masses, PointMass, "PointMass"))
         for i, one in enumerate(self.point_masses):
             if not one.u <= length:
@@ -197,7 +208,12 @@ def _no_longer(u: Floats, length: float) -> Floats:
     return np.minimum(u / max(times, 1.0), length)
 
 
-def _markers(value: ArrayLike, frames: int, static: bool) -> Floats:
+def seen_markers(value: ArrayLike) -> Floats:
+    """Return the coordinates of markers [m] as floats, NaN where one was lost or is masked.
+
+    Raises:
+        SceneError: they are not numbers, the rows differ in length, or one is infinite or huge.
+    """
     try:
         raw = np.asarray(unmasked(value))
     except ValueError:
@@ -205,10 +221,15 @@ def _markers(value: ArrayLike, frames: int, static: bool) -> Floats:
     if raw.dtype.kind not in "fiu":
         raise SceneError("markers", f"{raw.dtype}", "numbers [m], NaN where a marker was lost")
     markers = np.array(raw, dtype=float)
-    if markers.ndim != 3 or markers.shape[0] != frames or markers.shape[2] not in (2, 3) or markers.shape[1] < 3:
-        raise SceneError("markers", f"shape {markers.shape}", f"({frames}, at least 3 markers, 2 or 3) [m]")
     if np.isinf(markers).any() or not np.nanmax(np.abs(markers), initial=0.0) < 1e5:
         raise SceneError("markers", "an infinite or huge coordinate", "finite coordinates [m], NaN where lost")
+    return markers
+
+
+def _markers(value: ArrayLike, frames: int, static: bool) -> Floats:
+    markers = seen_markers(value)
+    if markers.ndim != 3 or markers.shape[0] != frames or markers.shape[2] not in (2, 3) or markers.shape[1] < 3:
+        raise SceneError("markers", f"shape {markers.shape}", f"({frames}, at least 3 markers, 2 or 3) [m]")
     if markers.shape[2] == 2:
         markers = np.concatenate([markers, 0.0 * markers[..., :1]], axis=2)
     markers[np.isnan(markers).any(axis=2)] = np.nan
@@ -244,7 +265,7 @@ def _zeros_of_lost(markers: Floats) -> NDArray[np.bool_]:
 
 def _held(held: tuple[int, ...], count: int) -> tuple[int, ...]:
     out = []
-    for i, marker in enumerate(held):
+    for i, marker in enumerate(instances("held", held, object, "markers' numbers")):
         if isinstance(marker, bool) or not isinstance(marker, int | np.integer) or not -count <= marker < count:
             raise SceneError(f"held[{i}]", marker, f"a marker's number, {-count} to {count - 1}")
         out.append(int(marker) % count)
@@ -278,9 +299,10 @@ def save_recording(recording: Recording, path: str | Path) -> None:
     """Write a recording as one `.npz` that `load_recording` reads.
 
     Raises:
-        SceneError: `path` does not end in `.npz`.
+        SceneError: `recording` is no Recording, or `path` does not end in `.npz`.
         OSError: it can't be written.
     """
+    instance("recording", recording, Recording, "a Recording")
     if Path(path).suffix != ".npz":
         raise SceneError("recording", Path(path).name, "a .npz")
     np.savez_compressed(

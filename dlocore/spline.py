@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dlocore.errors import SceneError, whole
+from dlocore.errors import SceneError, unmasked, whole
 from dlocore.pickling import Answered
 
 Floats = NDArray[np.float64]
@@ -68,13 +68,16 @@ def in_range(name: str, x: ArrayLike, end: float, unit: str) -> Floats:
     """Return `x`, a number or a row of numbers, as an array (k,).
 
     Raises:
-        SceneError: it is neither, or a number is outside 0 to `end` by more than rounding.
+        SceneError: it is neither, a number is masked, or a number is outside 0 to `end` by more than rounding.
     """
     allowed, margin = f"finite numbers at least 0 at most {end:g} [{unit}]", _ROUNDING * end
     try:
-        x = np.atleast_1d(np.asarray(x, dtype=float))
-    except (TypeError, ValueError):
+        raw = np.asarray(unmasked(x))
+    except ValueError:
         raise SceneError(name, repr(x), allowed) from None
+    if raw.dtype.kind not in "fiu":
+        raise SceneError(name, repr(x), allowed)
+    x = np.atleast_1d(raw.astype(float, copy=False))
     if x.ndim > 1:
         raise SceneError(name, f"shape {x.shape}", f"one row of {allowed}")
     for k in (x.argmin(), x.argmax()) if x.size else ():  # both return the index of a NaN, if there is one

@@ -53,6 +53,28 @@ def test_it_is_written_under_a_name_that_is_read(tmp_path: Path, name: str) -> N
     assert not list(tmp_path.iterdir())
 
 
+def test_what_is_no_recording_is_not_written(tmp_path: Path) -> None:
+    given: Any = {"times": TIMES}
+    with pytest.raises(SceneError, match=r"Allowed: a Recording\.$"):
+        save_recording(given, tmp_path / "shaken.npz")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("name", "unit"), [("diameter", "[m]"), ("linear_density", "[kg/m]")])
+def test_a_number_out_of_range_is_refused_with_its_unit(name: str, unit: str) -> None:
+    with pytest.raises(SceneError) as error:
+        recording(**{name: 0.0})
+    assert error.value.field == name
+    assert error.value.allowed.endswith(unit)
+
+
+@pytest.mark.parametrize("held", [0, "0", None])
+def test_the_held_markers_are_a_list(held: Any) -> None:
+    with pytest.raises(SceneError, match="markers' numbers") as error:
+        recording(held=held)
+    assert error.value.field == "held"
+
+
 def test_a_csv_with_its_json_gives_the_same_recording(tmp_path: Path) -> None:
     x = markers(columns=2)
     rows = ["t," + ",".join(f"x{i},y{i}" for i in range(5))]

@@ -23,19 +23,23 @@ from dlocore import (
     Scene,
     SceneError,
     Sphere,
+    SplineSurface,
     Straight,
     Table,
     Waypoints,
+    continued,
     equilibrium,
     plan,
     predict,
 )
 from dlocore.problem.problem import Problem, pose
+from dlocore.spline import uniform_knots
 from tests.solver.scenes import arc, cable
 
 NAN, INF = float("nan"), float("inf")
 UP = Move(displacement=(0.0, 0.1, 0.0), duration=1.0)
 SIDE = Grasp(u=0.3, path=UP)
+SURFACE = SplineSurface(np.zeros((4, 4, 4)), uniform_knots(4, 1.0), uniform_knots(4, 1.0))
 
 
 def scene(**parts: Any) -> Scene:
@@ -180,6 +184,10 @@ BAD: list[tuple[str, Callable[[], object]]] = [
     ("n_u", lambda: equilibrium(scene(), n_u=10**6)),
     ("u", lambda: equilibrium(scene(grasps=(SIDE,))).positions([0.5, 5.0])),
     ("cost", lambda: predict(scene(), cost=3)),  # type: ignore[arg-type]
+    ("surface", lambda: continued(None, None)),  # type: ignore[arg-type]
+    ("material", lambda: continued(SURFACE, {})),  # type: ignore[arg-type]
+    ("stretch", lambda: continued(SURFACE, None, stretch={})),  # type: ignore[arg-type]
+    ("t", lambda: continued(SURFACE, None, -1.0)),
     ("preset", lambda: Cable.preset(["paper"])),  # type: ignore[arg-type]
     # quality
     ("n_u", lambda: Quality(n_u=4, n_t=13)),

@@ -57,6 +57,23 @@ def test_moduli_are_converted_so_a_part_of_the_cable_can_be_replaced() -> None:
     assert stiffer.bending_stiffness == pytest.approx(2.0 * found.bending_stiffness)
 
 
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("bending_stiffness", "N m^2"),
+        ("axial_stiffness", "N"),
+        ("torsional_stiffness", "N m^2"),
+        ("youngs_modulus", "Pa"),
+        ("shear_modulus", "Pa"),
+    ],
+)
+def test_one_that_is_out_of_range_is_refused_with_its_unit(name: str, unit: str) -> None:
+    with pytest.raises(SceneError) as error:
+        of_moduli(**{name: 0.0})
+    assert error.value.field == name
+    assert error.value.allowed.endswith(f" [{unit}]")
+
+
 def test_a_modulus_replaces_the_stiffnesses_of_a_preset() -> None:
     preset, bare = Cable.preset("paper"), of_moduli(youngs_modulus=E, shear_modulus=G)
     found = Cable.preset("paper", youngs_modulus=E, diameter=D)

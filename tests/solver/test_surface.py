@@ -1,6 +1,7 @@
 """A surface is evaluated anywhere, in an order that suits its size."""
 
 import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,6 +60,15 @@ def test_a_place_off_the_cable_is_refused_by_its_value(u: list[float], given: st
             read(u, [0.5])
         assert (caught.value.field, caught.value.given) == ("u", given)
         assert caught.value.allowed == "finite numbers at least 0 at most 1.5 [m]"
+
+
+@pytest.mark.parametrize(
+    "u", ["0.5", ["0.5"], True, [True], None, [[0.1], [0.1, 0.2]], np.ma.masked_array([0.1, 0.5], mask=[False, True])]
+)
+def test_what_is_no_number_is_no_place(u: Any):
+    with pytest.raises(SceneError, match="finite numbers") as caught:
+        surface(9, 20).positions(u, [0.5])
+    assert caught.value.field == "u"
 
 
 @pytest.mark.parametrize("times", [1, 40], ids=["fewer times than control points", "more"])
