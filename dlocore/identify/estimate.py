@@ -10,22 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.compiling.interrupts import interruptible
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, instances, number, whole
 from dlocore.identify.candidate import Candidate, resized
 from dlocore.identify.identification import Identification, Progress
 from dlocore.identify.intervals import assess
-from dlocore.identify.parameters import DEFAULT, PLACES, Parameter, parameters, prepared
-from dlocore.identify.replay import Resolution
+from dlocore.identify.parameters import (
+    DEFAULT,
+    MEMORY_RATE,
+    PLACES,
+    Parameter,
+    clamp_needed,
+    parameters,
+    prepared,
+)
+from dlocore.identify.replay import LEAST_STEP, Resolution
 from dlocore.identify.search import Search
 from dlocore.identify.together import check_together
 from dlocore.identify.windows import cut, gaps_told
 from dlocore.recordings import PAIR, Recording
 from dlocore.scene.cable import Cable
-from dlocore.scene.scene import Environment, Quality
+from dlocore.scene.scene import MAX_N_U, Environment
 
 Floats = NDArray[np.float64]
 
 WINDOW = 5.0  # [s]: longer recordings are replayed in windows of about this length, each from its own start
+_SHORTEST, _LONGEST = 1e-3, 1e4  # [s] of such windows
 _BEGINS = 0.5, 1.5  # [s] of the windows on which a search begins, for a cable of 1 m; it swings once in 2 s
 _MOST_SHORT = 8  # of these windows, at most
 _COARSE = 13  # control points with which they are replayed, at most
@@ -67,10 +76,10 @@ def identify(
             the recordings. Motion and shape depend on forces per mass alone, so its linear density is taken as known.
         environment: first guesses of the drag, and a table.
         names: parameters to identify (`parameters.SCALARS`, "rest_curvature", "clamp_angles", "marker_offsets").
-        start: a candidate to begin with, instead of cable and environment.
+        start: a candidate to begin with, with its own cable and environment: neither is given beside it.
         resolution: how finely recordings are replayed.
-        window: [s] of the windows into which longer recordings are cut. They are also cut where held markers are lost
-            for too long.
+        window: [s] of the windows into which longer recordings are cut, 0.001 to 10,000. They are also cut where held
+            markers are lost for too long.
         iterations: at most.
         on_progress: called after every iteration.
         cancelled: called between replays; if it returns True the search stops.
@@ -80,11 +89,17 @@ def identify(
         Cancelled: `cancelled` returned True.
     """
     began = perf_counter()
+    recordings = instances("recordings", recordings, Recording, "Recording")
     if not recordings:
         raise SceneError("recordings", [], "at least one recording")
+    for name, part in (("cable", cable), ("environment", environment)):
+        if start is not None and part is not None:
+            raise SceneError(name, f"{name} and start", f"either start or {name}", "start has its own")
     check_together(recordings)
     resolution = resolution or Resolution()
-    Quality(n_u=resolution.n_u, n_t=resolution.n_u)  # refuses an invalid number of control points
+    whole("n_u", resolution.n_u, at_least=5, at_most=MAX_N_U)
+    number("step", resolution.step, at_least=LEAST_STEP, at_most=1.0, unit="s")
+    window = number("window", window, at_least=_SHORTEST, at_most=_LONGEST, unit="s")
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
@@ -154,14 +169,11 @@ def _twists(recordings: Sequence[Recording], cable: Cable) -> bool:
 
 def _check_clamps(recordings: Sequence[Recording], chosen: Sequence[Parameter], candidate: Candidate) -> None:
     """Refuse parameters that depend on the angle of the sections if a recording has no clamp, which alone shows it."""
-    turning = ("torsional_stiffness", "turn", "yield_strain", "rest_curvature", "marker_offsets")
-    sought = {p.name.partition("[")[0] for p in chosen}
-    needing = [name for name in turning if name in sought] or (["a cable that yields"] if candidate.twist else [])
+    needed = clamp_needed(chosen, candidate)
     for recording in recordings:
-        if needing and not any(h.towards is not None for h in recording.holds):
-            reason = f"Without a clamp nothing shows how the sections are turned, which {needing[0]} needs"
+        if needed and not any(h.towards is not None for h in recording.holds):
             allowed = "recordings in which a gripper holds two neighbouring markers, as a clamp"
-            raise SceneError("recordings", f"{recording.name!r} without a clamp", allowed, reason)
+            raise SceneError("recordings", f"{recording.name!r} without a clamp", allowed, needed)
 
 
 def _assumed(
@@ -189,6 +201,8 @@ def _assumed(
         kept.append(f"axial_stiffness {given.cable.axial_stiffness:g} N")
     if cable and not any(r.diameter is not None for r in recordings):
         kept.append(f"diameter {given.cable.diameter:g} m")
+    if "yield_strain" in names and given.cable.memory_rate is None:
+        kept.append(f"memory_rate {MEMORY_RATE:g} 1/s")
     said = []
     if kept:
         said.append(f"Neither given nor identified, so kept at an assumed value: {', '.join(kept)}.")

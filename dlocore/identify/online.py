@@ -1,20 +1,20 @@
 """Identification while a cable moves, from a sliding window of frames, with the last estimate as prior."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.compiling.interrupts import interruptible
-from dlocore.errors import SceneError, array, unmasked
+from dlocore.errors import SceneError, array, instance, number
 from dlocore.identify.candidate import Candidate
-from dlocore.identify.parameters import DEFAULT, parameters, prepared
+from dlocore.identify.parameters import DEFAULT, clamp_needed, parameters, prepared
 from dlocore.identify.replay import Played, Replay, Resolution
 from dlocore.identify.search import measured, robust_deviation, weights
 from dlocore.identify.windows import gaps
-from dlocore.recordings import Recording
+from dlocore.recordings import LEAST_FRAMES, Recording, seen_markers
 from dlocore.scene.cable import Cable
 from dlocore.scene.scene import Environment
 
@@ -53,13 +53,19 @@ class Identifier:
     needs an update.
 
     Args:
-        u: material coordinates of the markers (m,) [m].
-        held: markers that grippers hold.
+        u: material coordinates of the markers (m,) [m], at least three, rising from 0 at the earliest.
+        held: numbers of the markers that grippers hold, at least one; negative ones count from the end. Two held
+            neighbours within 6 % of the length are one clamp. Others are point grasps, which leave the direction free:
+            if those hold a cable that is in fact clamped, EI comes out wrong.
         cable, environment: first guesses, and what is known.
-        names: parameters to identify.
-        window: [s].
-        rate: of the frames [Hz].
+        names: parameters to identify, as in `identify`.
+        window: above 0 to 60 [s]; it has 12 frames at least.
+        rate: of the frames, 1 to 10,000 [Hz].
         resolution: how finely the window is replayed.
+
+    Raises:
+        SceneError: an argument is out of range or of another type, nothing is held, or a parameter is unknown or needs
+            a clamp.
     """
 
     def __init__(
@@ -74,16 +80,34 @@ class Identifier:
         rate: float = 30.0,
         resolution: Resolution | None = None,
     ) -> None:
-        self._u = array("u", u, shape=(None,), unit="m")
-        self._held = tuple(held)
-        self._length = cable.length
+        instance("cable", cable, Cable, "a Cable")
+        instance("environment", environment, Environment | None, "an Environment, or None")
+        instance("resolution", resolution, Resolution | None, "a Resolution, or None")
+        start = Candidate(cable=cable, environment=environment or Environment())
+        u = array("u", u, shape=(None,), unit="m")
+        self._count = len(u)
+        self._window = Recording(  # its frames are put into it at each update
+            times=np.arange(LEAST_FRAMES),
+            markers=np.zeros((LEAST_FRAMES, self._count, 3)),
+            u=u,
+            held=held,
+            length=cable.length,
+            gravity=start.environment.gravity,
+        )
+        if not self._window.held:
+            raise SceneError("held", (), "at least one held marker", "Nothing shows how the cable is moved")
+        window = number("window", window, above=0.0, at_most=60.0, unit="s")
+        rate = number("rate", rate, at_least=1.0, at_most=1e4, unit="Hz")
         self._frames = max(12, round(window * rate))
         self._times: deque[float] = deque(maxlen=self._frames)
         self._markers: deque[Floats] = deque(maxlen=self._frames)
         self._resolution = resolution or Resolution(n_u=9, step=1.0 / rate, start_frames=6)
-        self._chosen = parameters(names, 2)
-        start = Candidate(cable=cable, environment=environment or Environment())
-        self._candidate = prepared(start, tuple(p.name for p in self._chosen), 2)
+        clamps = sum(h.towards is not None for h in self._window.holds)
+        self._chosen = parameters(names, clamps, self._window.free.tolist())
+        self._candidate = prepared(start, tuple(p.name for p in self._chosen), clamps, self._count)
+        needed = clamp_needed(self._chosen, self._candidate)
+        if needed and not clamps:
+            raise SceneError("held", self._window.held, "two neighbouring markers, as a clamp", needed)
         self._precision = np.eye(len(self._chosen)) / _FIRST**2
         self._next = 0
 
@@ -101,14 +125,15 @@ class Identifier:
         """Take a frame: time [s] and markers (m, 3) [m], NaN or masked if lost.
 
         Raises:
-            SceneError: the time is not after the last one, or the number of markers differs.
+            SceneError: the time is not after the last one, the number of markers differs, or something is no number.
         """
-        x = np.array(unmasked(markers), dtype=float)
-        if x.shape != (len(self._u), 3):
-            raise SceneError("markers", f"shape {x.shape}", f"({len(self._u)}, 3)")
+        time = number("time", time, unit="s")
+        x = seen_markers(markers)
+        if x.shape != (self._count, 3):
+            raise SceneError("markers", f"shape {x.shape}", f"({self._count}, 3)")
         if self._times and not time > self._times[-1]:
             raise SceneError("time", time, f"after the last frame at {self._times[-1]:g} s")
-        self._times.append(float(time))
+        self._times.append(time)
         self._markers.append(x)
 
     def _derivatives(self, replay: Replay, played: Played, x: Floats) -> Floats:
@@ -134,26 +159,20 @@ class Identifier:
     def update(self) -> Update | None:
         """Improve the estimate by the latest frames; return None while there are too few, or if they show nothing.
 
-        They show nothing if a held marker is lost for too long, if nothing can be replayed, or if the motion is so
-        unstable that it has no derivative.
+        They show nothing if a held marker is lost for too long, if a marker is hardly ever seen, if nothing can be
+        replayed, or if the motion is so unstable that it has no derivative.
         """
         if len(self._times) < self._frames:
             return None
         began = perf_counter()
-        recording = Recording(
-            times=np.array(self._times) - self._times[0],
-            markers=np.array(self._markers),
-            u=self._u,
-            held=self._held,
-            length=self._length,
-            gravity=self._candidate.environment.gravity,
-        )
-        if gaps(recording):
-            return None
+        times = np.array(self._times) - self._times[0]
         try:
+            recording = replace(self._window, times=times, markers=np.array(self._markers))
+            if gaps(recording):
+                return None
             replay = Replay(recording, self._resolution)
             played = replay.play(self._candidate)
-        except SceneError:  # outliers where the window begins: no cable has such a shape
+        except SceneError:  # a marker that is hardly seen, or outliers where the window begins: no cable lies like that
             return None
         if played.stopped or played.motion.split > 0:  # neighbours of a motion that took smaller steps jump
             return None

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, instances
 from dlocore.identify.candidate import Candidate
 
 Floats = NDArray[np.float64]
@@ -55,6 +55,8 @@ _INDEXED = re.compile(r"(rest_curvature|clamp_angles|marker_offsets)\[(\d+)\]\[(
 _SEVERAL = {"rest_curvature": ("1/m", 2.0), "clamp_angles": ("rad", 0.2), "marker_offsets": ("m", 0.01)}
 _NEEDED = {"clamp_angles": "where a recording has a clamp", "marker_offsets": "where a recording has free markers"}
 _PRIOR_LOG = 3.0  # standard deviation of the logarithms: a factor of 20 either way is no surprise
+_TURNING = ("torsional_stiffness", "turn", "yield_strain", "rest_curvature", "marker_offsets")
+MEMORY_RATE = 100.0  # [1/s] of a cable whose yield strain is identified, if none is given
 PLACES = 5  # along the cable at which its rest curvature is sought
 
 
@@ -102,7 +104,7 @@ _SCALARS = {
             name="turn", unit="rad", logarithmic=False, scale=1.0, least=-np.inf, prior=1.0, centred=True,
             get=lambda c: c.turn, put=lambda c, x: replace(c, turn=x),
         ),
-        _of_cable("yield_strain", "", first=0.02, memory_rate=100.0),
+        _of_cable("yield_strain", "", first=0.02, memory_rate=MEMORY_RATE),
     )
 }  # fmt: skip
 SCALARS = tuple(_SCALARS)
@@ -120,11 +122,12 @@ def parameters(
         places: number of places along the cable at which its rest curvature is sought.
 
     Raises:
-        SceneError: a name is unknown, is given twice, or refers to a place, clamp or marker that does not exist.
+        SceneError: a name is no text, is unknown, is given twice, or refers to a place, clamp or marker that does not
+            exist.
     """
     there = {"rest_curvature": range(places), "clamp_angles": range(clamps), "marker_offsets": [int(i) for i in free]}
     found: list[Parameter] = []
-    for name in names:
+    for name in instances("parameters", names, str, "names"):
         match = _INDEXED.fullmatch(name)
         several = match[1] if match else name
         if several in there and not there[several]:
@@ -162,6 +165,13 @@ def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int, markers:
     if "turn" in names or "torsional_stiffness" in names or candidate.yields:
         candidate = replace(candidate, twist=True)
     return candidate
+
+
+def clamp_needed(chosen: Sequence[Parameter], candidate: Candidate) -> str:
+    """Return a message on what depends on the angle of the sections, which only a clamp shows; "" if nothing does."""
+    sought = {p.name.partition("[")[0] for p in chosen}
+    needing = [name for name in _TURNING if name in sought] or (["a cable that yields"] if candidate.twist else [])
+    return f"Without a clamp nothing shows how the sections are turned, which {needing[0]} needs" if needing else ""
 
 
 def _component(name: str, i: int, d: int) -> Parameter:

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from dlocore.answer.frames import unit
-from dlocore.errors import SceneError
+from dlocore.errors import SceneError, number, whole
 from dlocore.identify.beginning import rests, start_markers
 from dlocore.identify.candidate import Candidate, varied
 from dlocore.identify.frames import across, carried, tilted, turned_from, with_sections
@@ -23,16 +23,17 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.problem import Problem, pose
 from dlocore.recordings import Hold, Recording
 from dlocore.scene.paths import Waypoints
-from dlocore.scene.scene import ControlPoints, Grasp, Scene, Switch
+from dlocore.scene.scene import MAX_N_U, ControlPoints, Grasp, Scene, Switch
 from dlocore.sensitivity import KnownMotion, beside, factored, objection
 from dlocore.solvers.march import STRONGLY_DAMPED, March, march
 from dlocore.solvers.monitor import Monitor
-from dlocore.spline import design_matrix
+from dlocore.spline import DEGREE, design_matrix
 from dlocore.statics.statics import start_grid
 
 Floats = NDArray[np.float64]
 
 LIES_SO = "markers that show how the cable lies, a first guess closer to it, or more control points"
+LEAST_STEP = 1e-5  # [s] of a search; the step is halved for the intervals
 _SLACK = 1.003  # of the cable between two grippers: held markers farther apart are brought nearer
 _REST_FRAMES = 8  # frames from which on it can be seen whether a start is at rest
 _CARRIED = 3  # tangents from a marker to the next, over which a frame is carried
@@ -40,11 +41,20 @@ _CARRIED = 3  # tangents from a marker to the next, over which a frame is carrie
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Resolution:
-    """How finely a recording is replayed: control points, time step [s], and frames that its start is taken from."""
+    """How finely a recording is replayed: control points, time step [s], and frames that its start is taken from.
+
+    Raises:
+        SceneError: a value is out of range.
+    """
 
     n_u: int = 13
     step: float = 0.005
     start_frames: int = 12
+
+    def __post_init__(self) -> None:
+        whole("n_u", self.n_u, at_least=5, at_most=2 * MAX_N_U - DEGREE)  # that of intervals, too
+        number("step", self.step, at_least=0.5 * LEAST_STEP, at_most=1.0, unit="s")
+        whole("start_frames", self.start_frames, at_least=2, at_most=1000)
 
 
 @dataclass(frozen=True, eq=False)

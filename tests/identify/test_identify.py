@@ -286,6 +286,39 @@ def test_a_density_that_was_assumed_is_told_of(density: float | None) -> None:
     assert told is (density is None)
 
 
+@pytest.mark.parametrize(
+    ("field", "asked"),
+    [
+        ("recordings", {"recordings": still()}),
+        ("recordings[0]", {"recordings": [None]}),
+        ("window", {"window": 0}),
+        ("window", {"window": np.nan}),
+        ("window", {"window": "5"}),
+        ("step", {"resolution": Resolution(step=6e-6)}),
+        ("parameters", {"names": "drag"}),
+        ("cable", {"cable": CABLE, "start": Candidate(cable=CABLE, environment=DRAG)}),
+        ("environment", {"environment": DRAG, "start": Candidate(cable=CABLE, environment=DRAG)}),
+    ],
+)
+def test_what_can_not_be_used_is_refused(field: str, asked: dict[str, Any]) -> None:
+    with pytest.raises(SceneError) as error:
+        identify(**({"recordings": [still()]} | asked))
+    assert error.value.field == field
+
+
+@pytest.mark.parametrize("given", [None, 50.0])
+def test_a_memory_rate_that_was_assumed_is_told_of(given: float | None) -> None:
+    yields: dict[str, Any] = {} if given is None else {"yield_strain": 0.01, "memory_rate": given}
+    recording = simulated(3, 0.5, cable=CABLE, environment=DRAG)
+    asked = ("yield_strain",)
+    found = identify(
+        [recording], replace(CABLE, **yields), DRAG, names=asked, iterations=1, resolution=Resolution(n_u=9)
+    )
+    assert found.cable.memory_rate == (given or 100.0)
+    told = "Neither given nor identified, so kept at an assumed value: memory_rate 100 1/s." in found.message
+    assert told is (given is None)
+
+
 @pytest.mark.parametrize("n_u", [100_000, 4, 0, -5, 13.0, True])
 def test_a_number_of_control_points_out_of_range_is_refused(n_u: Any) -> None:
     with pytest.raises(SceneError) as error:

@@ -1,5 +1,7 @@
 """Names of parameters: each means what is there, and what is not there is refused."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,12 @@ def test_a_number_of_a_clamp_place_or_marker_that_is_not_there_is_refused(name: 
 def test_angles_of_clamps_are_refused_where_there_is_no_clamp() -> None:
     with pytest.raises(SceneError, match=r"^parameters: got clamp_angles\. Allowed: where a recording has a clamp"):
         parameters(("drag", "clamp_angles"), 0, FREE)
+
+
+def test_a_name_alone_is_no_list_of_names() -> None:
+    names: Any = "drag"
+    with pytest.raises(SceneError, match=r"^parameters: got 'drag'\. Allowed: a list of names\.$"):
+        parameters(names, 2)
 
 
 def test_several_stand_for_all_that_are_there() -> None:
