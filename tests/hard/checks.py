@@ -1,4 +1,4 @@
-"""What every hard case is held to: its true answer, its laws, and a status that tells the truth."""
+"""What every hard case is held to: its name, its true answer, its laws, and a status that tells the truth."""
 
 import pytest
 
@@ -18,16 +18,18 @@ def of_group(group: str) -> list[object]:
 
 
 def hold_to(case: Case) -> None:
-    """Solve a case and hold the answer to its truth, or expect that it is refused."""
-    if case.end == "refused":
-        with pytest.raises(SceneError):
+    """Solve a case and hold the answer to its name and its truth, or expect that it is refused by that field."""
+    if case.refused:
+        with pytest.raises(SceneError) as refused:
             predict(posed(case))
+        assert refused.value.field == case.refused
         return
     prediction = predict(posed(case))
     asked = prediction.scene.quality.method
     assert asked in ("auto", prediction.accuracy.method)  # a march in place of a least squares is none
     assert prediction.status == "converged", prediction.message
     keep_laws(prediction)
+    assert case.premise is None or case.premise(prediction), "it does not do what it is named for"
     if case.error is not None:
         assert case.error(prediction) <= case.within
 

@@ -7,11 +7,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.premises import Premise, strands_apart
 from dlocore import Cable, Environment, Move, Prediction, Quality, Scene
+from dlocore.answer.clearance import least_distance
 
 Floats = NDArray[np.float64]
 Group = Literal["geometry", "stiffness", "motion", "effects", "numbers"]
-End = Literal["converged", "refused"]
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0))
 TARGET = 0.005  # of the length: the target error of the cases
@@ -29,7 +30,8 @@ class Case:
         make: returns the scene, or raises SceneError where it has to be refused.
         error: distance of a prediction from the true answer, of the length; None where only the laws tell.
         within: that distance at most.
-        end: "converged" or "refused".
+        premise: whether a prediction does what the name promises; None where the scene as given is all of it.
+        refused: field that the SceneError names, "" where the case has to converge.
     """
 
     name: str
@@ -39,7 +41,8 @@ class Case:
     make: Callable[[], Scene]
     error: Callable[[Prediction], float] | None
     within: float
-    end: End
+    premise: Premise | None
+    refused: str
 
 
 CASES: dict[str, Case] = {}
@@ -51,7 +54,8 @@ def case(
     *,
     error: Callable[[Prediction], float] | None = None,
     within: float = TARGET,
-    end: End = "converged",
+    premise: Premise | None = None,
+    refused: str = "",
 ) -> Callable[[Callable[[], Scene]], Callable[[], Scene]]:
     """Enter a scene into the cases under the name of its function; its docstring says what is hard."""
 
@@ -59,8 +63,9 @@ def case(
         name = make.__name__.replace("_", " ")
         hard = " ".join((make.__doc__ or "").split())
         CASES[name] = Case(
-            name=name, group=group, hard=hard, truth=truth, make=make, error=error, within=within, end=end
-        )
+            name=name, group=group, hard=hard, truth=truth, make=make, error=error, within=within, premise=premise,
+            refused=refused,
+        )  # fmt: skip
         return make
 
     return enter
@@ -96,3 +101,29 @@ def at_end(prediction: Prediction, u: Any) -> Floats:
 def samples(prediction: Prediction) -> tuple[Floats, Floats]:
     surface = prediction.surface
     return np.linspace(0.0, surface.length, 65), np.linspace(0.0, surface.horizon, 33)
+
+
+DEEPEST = 0.25 * 0.005  # [m]: a quarter of the diameter of the cord
+
+
+def depth(prediction: Prediction) -> float:
+    """Return how deep the cable is in the table or in an obstacle [m], at the worst; 0 where it is in none."""
+    surface, around, radius = prediction.surface, prediction.scene.environment, 0.5 * prediction.scene.cable.diameter
+    gaps = [0.0]
+    if around.obstacles:
+        rows = np.array([obstacle.row() for obstacle in around.obstacles])
+        gaps.append(least_distance(surface, rows, 1e-3 * radius) - radius)
+    if around.table is not None:
+        gaps.append(float(surface.sample(401, 401)[2][..., 2].min()) - around.table.height)  # of the middle
+    return -min(gaps)
+
+
+def overlap(prediction: Prediction) -> float:
+    """Return how deep strands are in each other [m], at the worst; 0 where they are apart."""
+    return max(0.0, 1.0 - strands_apart(prediction)) * prediction.scene.cable.diameter
+
+
+def apart(a: Prediction, b: Prediction) -> float:
+    """Return the largest distance of two motions of the same cable and horizon [m]."""
+    u, t = samples(a)
+    return float(np.linalg.norm(a.surface.positions(u, t) - b.surface.positions(u, t), axis=-1).max())
