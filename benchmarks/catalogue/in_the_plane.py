@@ -4,6 +4,7 @@ import numpy as np
 
 from benchmarks.catalogue.entries import Entries
 from benchmarks.catalogue.parts import WEIGHTLESS, bow, cord, move, on_table, pegs, wave
+from benchmarks.premises import comes_to_rest, ends_on, slides_on, touches, untouched
 from dlocore import (
     Box,
     Cable,
@@ -131,14 +132,14 @@ def three_grippers_lay_an_s_on_a_rough_table() -> Scene:
     return Scene(cable=cord(), shape=shape, grasps=grasps, environment=on_table(0.25))
 
 
-@entry
+@entry.where(slides_on)
 def sloping_table_that_the_cable_slides_down() -> Scene:
     around = Environment(gravity=(2.5, 0.0, -9.5), table=Table(friction=0.15))
     grasp = Grasp(u=0.0)
     return Scene(cable=cord(), shape=Straight(direction=(0.2, 1, 0)), grasps=(grasp,), environment=around, horizon=1.5)
 
 
-@entry
+@entry.where(comes_to_rest)
 def thrown_cable_that_friction_stops() -> Scene:
     start = Straight(velocity=(0.2, 0.8, 0.0))
     return Scene(cable=cord(), shape=start, environment=on_table(0.3), horizon=1.0)
@@ -147,21 +148,21 @@ def thrown_cable_that_friction_stops() -> Scene:
 # --- around pegs and along walls, on a table ---
 
 
-@entry
+@entry.where(ends_on("obstacles[0]"))
 def dragged_against_a_peg() -> Scene:
     grasp = Grasp(u=0.0, path=move(0.2, 0.4, time=2.0))
-    around = on_table(0.3, obstacles=pegs((0.5, 0.1)))
+    around = on_table(0.3, obstacles=pegs((0.25, 0.06)))
     return Scene(cable=cord(), shape=Straight(), grasps=(grasp,), environment=around)
 
 
-@entry
+@entry.where(touches("obstacles[0]", "obstacles[1]"))
 def threaded_between_two_pegs() -> Scene:
     grasp = Grasp(u=0.0, path=move(0.1, 0.35, time=2.0))
-    around = on_table(0.2, obstacles=pegs((0.35, 0.06), (0.7, -0.04), friction=0.1))
+    around = on_table(0.2, obstacles=pegs((0.35, 0.06), (0.75, -0.019), friction=0.1))
     return Scene(cable=cord(), shape=Straight(), grasps=(grasp,), environment=around)
 
 
-@entry
+@entry.where(touches("obstacles[0]"))
 def pulled_around_a_smooth_peg() -> Scene:
     points = np.array([[-0.3, 0.0], [-0.2, 0.0], [-0.1, 0.0], [0.0, 0.0]])
     phi = np.linspace(0.0, np.pi / 2, 12)[1:]
@@ -178,7 +179,7 @@ def pulled_around_a_smooth_peg() -> Scene:
     )
 
 
-@entry
+@entry.where(ends_on("obstacles[0]"))
 def pushed_sideways_into_a_wall() -> Scene:
     wall = Box(center=(0.5, 0.25, 0.0), size=(1.4, 0.1, 0.1), friction=0.2)
     grasps = (Grasp(u=0.1, path=move(0.0, 0.17, time=1.5)), Grasp(u=0.9, path=move(-0.05, 0.05, time=1.5)))
@@ -186,14 +187,14 @@ def pushed_sideways_into_a_wall() -> Scene:
     return Scene(cable=cord(), shape=shape, grasps=grasps, environment=on_table(0.2, obstacles=(wall,)))
 
 
-@entry
+@entry.where(untouched("obstacles[0]", "obstacles[1]", "obstacles[2]"))
 def pegs_far_from_the_motion() -> Scene:
     grasp = Grasp(u=0.25, path=move(0.0, 0.2, time=1.5))
     around = on_table(0.2, obstacles=pegs((0.5, -0.8), (2.0, 0.3), (-0.9, 0.5)))
     return Scene(cable=cord(), shape=Straight(), grasps=(grasp,), environment=around)
 
 
-@entry
+@entry.where(ends_on("obstacles[0]"))
 def stiff_rod_levered_around_a_peg() -> Scene:
     rod = Cable.preset("tent-pole", length=0.8)
     grasp = Grasp(u=0.0, path=move(0.0, -0.1, time=1.5))
