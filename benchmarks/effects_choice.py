@@ -2,7 +2,7 @@
 
 Every scene of the catalogue is solved with the automatically chosen effects and with all effects on, to the same target
 error of 0.2 % of the length. Then each effect is left out of a scene that calls for it. Both tables are Markdown. Times
-are medians of whole calls of `predict` after a first one that is not counted. One thread.
+are the processor's, medians of whole calls of `predict` after a first one that is not counted. One thread.
 """
 
 import argparse
@@ -40,7 +40,7 @@ CALLS_FOR = {
 
 @dataclass(frozen=True)
 class Timed:
-    """A prediction and the median time of a whole call [s]; or why the scene was refused."""
+    """A prediction and the median processor time of a whole call [s]; or why the scene was refused."""
 
     prediction: Prediction | None
     median: float
@@ -60,9 +60,9 @@ def measured(scene: Scene, repeats: int) -> Timed:
         return Timed(None, np.nan, str(error))
     times: list[float] = []
     while len(times) < repeats and (not times or sum(times) < PATIENCE):
-        began = time.perf_counter()
+        began = time.process_time()
         prediction = predict(scene, deadline=DEADLINE)
-        times.append(time.perf_counter() - began)
+        times.append(time.process_time() - began)
     return Timed(prediction, float(np.median(times)))
 
 
