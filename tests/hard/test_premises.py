@@ -1,7 +1,8 @@
-"""Premises notice a motion that does not do what its scene is named for."""
+"""Premises and errors of cases notice a motion that does not do what its scene is named for, or is not true to it."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from benchmarks.catalogue import catalogue
@@ -17,7 +18,8 @@ from benchmarks.premises import (
     untouched,
     yields,
 )
-from dlocore import Cylinder, Grasp, Prediction, Scene, predict
+from dlocore import Cylinder, Grasp, Move, Prediction, Scene, Table, predict
+from tests.hard.checks import hold_to
 
 
 def case(name: str) -> Scene:
@@ -60,6 +62,46 @@ def test_a_motion_that_misses_what_its_case_is_named_for_is_noticed(name: str) -
     premise = CASES[name].premise
     assert premise is not None
     assert not premise(predict(MISSED[name]()))
+
+
+def held_by_a_point() -> Scene:
+    scene = case("two grasps 1 mm apart")
+    return replace(scene, grasps=scene.grasps[:1])
+
+
+def on_a_slippery_table(scene: Scene) -> Scene:
+    return replace(scene, environment=replace(scene.environment, table=Table(friction=0.02)))
+
+
+UNTRUE = {
+    "two grasps 1 mm apart": held_by_a_point,
+    "stick slip": lambda: on_a_slippery_table(case("stick slip")),
+    "twisted past the critical twist": lambda: case("ten turns"),
+}
+
+
+@pytest.mark.parametrize("name", UNTRUE)
+def test_an_answer_that_is_not_true_to_its_case_is_noticed(name: str) -> None:
+    named = CASES[name]
+    assert named.error is not None
+    assert named.error(predict(UNTRUE[name]())) > named.within
+
+
+def test_the_torque_is_that_of_all_the_turns() -> None:
+    ten = CASES["ten turns"]
+    assert ten.error is not None
+    nine = posed(ten)
+    first, last = nine.grasps
+    assert isinstance(last.path, Move)
+    turned = replace(last.path, rotation=0.9 * np.asarray(last.path.rotation))
+    assert ten.error(predict(replace(nine, grasps=(first, replace(last, path=turned))))) == pytest.approx(0.1, rel=1e-2)
+
+
+def test_a_case_that_misses_its_name_or_is_refused_by_another_field_fails() -> None:
+    with pytest.raises(AssertionError, match="named for"):
+        hold_to(replace(CASES["no gravity"], premise=strands_meet))
+    with pytest.raises(AssertionError):
+        hold_to(replace(CASES["zero duration"], refused="shape"))
 
 
 @pytest.mark.parametrize(
