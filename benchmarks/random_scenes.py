@@ -6,7 +6,8 @@ Every scene is drawn from (seed, index) alone; `--index 17` runs only scene 17 a
 all scenes are run with the short `--deadline` and judged by the laws. Of those that do not converge within it, N that
 the seed draws are run again with `--again-deadline` and checked for whether they determine their motion. Without
 `--again`, all that do not converge are checked. With `--last-deadline`, those that fail in this second stage are run a
-third time with that deadline.
+third time with that deadline. With `--images`, each scene is predicted as it is and as its images: turned, mirrored,
+from the other end, and in other units. Only a table of the distances between these answers is then printed.
 """
 
 import argparse
@@ -27,6 +28,8 @@ import numpy as np
 
 from benchmarks.hard.generator import as_python, draw
 from benchmarks.hard.judge import WRONG, Whose, by_a_march, is_undetermined, left_its_grid, run, tells
+from benchmarks.hard.looks import LOOKS, look
+from benchmarks.hard.looks import table as table_of_images
 from benchmarks.hard.shares import GROWTHS, Strata, drawn_again, has_failed, in_place_of, is_left, share, strata
 from benchmarks.machine import machine_line
 from dlocore import SceneError, warm_up
@@ -54,6 +57,7 @@ class Stage(NamedTuple):
         patience: time that each further solve of the judge is allowed [s].
         checked: share that is compared with refined marches.
         measured: whose sensitivity is measured, see `judge.run`.
+        images: compare each scene with its images instead of judging it.
     """
 
     seed: int
@@ -61,16 +65,20 @@ class Stage(NamedTuple):
     patience: float
     checked: float
     measured: Whose
+    images: bool = False
 
     def run(self, index: int) -> dict[str, Any]:
         """Run a scene and return its record."""
         drawn, checked = draw(self.seed, index), is_checked(self.seed, index, self.checked)
+        if self.images:
+            return look(drawn, self.deadline)
         return run(drawn, self.deadline, checked, patience=self.patience, measured=self.measured)
 
     @property
     def longest(self) -> float:
         """Time after which a scene hangs [s]."""
-        return HANG * max(self.deadline, self.patience) + JUDGED
+        solves = 1 + len(LOOKS) if self.images else HANG
+        return solves * max(self.deadline, self.patience) + JUDGED
 
 
 class Job(NamedTuple):
@@ -286,6 +294,7 @@ def main() -> None:
         "--measure", choices=("failed", "all"), default="failed",
         help="scenes whose start is disturbed in a run of one stage, in addition to those compared (default: failed)",
     )  # fmt: skip
+    parser.add_argument("--images", action="store_true", help="compare each scene with its images, and do nothing else")
     parser.add_argument("--index", type=int, help="run this scene alone and print it as Python")
     parser.add_argument("--summary", action="store_true", help="only print the summary of the file")
     options = parser.parse_args()
@@ -321,8 +330,11 @@ def main() -> None:
         return of_stage(number)
 
     measured: Whose = "checked" if staged else options.measure
-    once = Stage(options.seed, options.deadline, patience, part, measured)
+    once = Stage(options.seed, options.deadline, patience, part, measured, options.images)
     first = add(once, list(range(options.count)), 1)
+    if options.images:
+        print("\n".join([f"seed {options.seed}, {len(first)} scenes", "", table_of_images(first), "", machine_line()]))
+        return
     again: list[dict[str, Any]] = []
     last: list[dict[str, Any]] = []
     if staged:

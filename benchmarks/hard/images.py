@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from dlocore import (
@@ -66,7 +66,12 @@ class Image:
 
 def turned(angle: float, shift: Floats) -> Image:
     """Return a rotation about the vertical, which does not affect gravity and tables, and a shift."""
-    return Image(frame=Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix(), shift=shift)
+    return tilted([0.0, 0.0, angle], shift)
+
+
+def tilted(turn: ArrayLike, shift: Floats) -> Image:
+    """Return a rotation by a rotation vector (3,) [rad] and a shift. Gravity is rotated too, but a table stays level."""
+    return Image(frame=Rotation.from_rotvec(turn).as_matrix(), shift=shift)
 
 
 def mirrored() -> Image:
