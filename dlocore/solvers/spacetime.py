@@ -383,3 +383,4 @@ def _linearised(solver: WindowSolver, control: Floats) -> tuple[float, Floats | 
         if damping > 0.0 or not np.isfinite(value):
             return value, None, right, damping
         damping = _DAMPING
+        del A  # it is spoilt, and most of the memory of a solve

@@ -1,6 +1,7 @@
 """The space-time least squares: its compiled normal equations (docs/model.md eq. 16, 17), and its tension (eq. 15b)."""
 
-from typing import Literal
+import weakref
+from typing import Literal, cast
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from dlocore.problem.time_grid import time_knots
 from dlocore.solvers.bands import dense_of
 from dlocore.solvers.march import march
 from dlocore.solvers.monitor import Monitor
-from dlocore.solvers.spacetime import WindowSolver, behind_softer, windows_of
+from dlocore.solvers.spacetime import WindowSolver, _linearised, behind_softer, windows_of
 from dlocore.solvers.timefit import fit
 from dlocore.statics.statics import start_grid
 from tests.solver.scenes import arc
@@ -227,3 +228,28 @@ def test_strained_as_the_march_it_bears_the_tension_of_the_march(soft: float) ->
     resting = behind_softer(problem, motion, between, soft * stiffness).axial[..., 0]
     expected = tension if soft < 1.0 else stiffness * mean  # of the true stiffness the march is no guide
     np.testing.assert_allclose(soft * stiffness * (mean - resting), expected, atol=1e-9 * np.abs(tension).max())
+
+
+class Indefinite:
+    """A least squares whose normal matrix has no positive factors without damping; it counts those that are kept."""
+
+    def __init__(self) -> None:
+        self.matrices: list[weakref.ref[Floats]] = []
+        self.kept: list[int] = []
+
+    def objective(self, control: Floats, matrix: bool) -> tuple[float, Floats, Floats]:
+        self.kept.append(sum(one() is not None for one in self.matrices))
+        A = np.ones((2, 3, 12))
+        self.matrices.append(weakref.ref(A))
+        return 1.0, A, np.zeros(6)
+
+    def factor(self, A: Floats, damping: float) -> bool:
+        return damping > 0.0
+
+
+def test_a_matrix_without_positive_factors_is_given_up_before_the_next_is_made() -> None:
+    solver = Indefinite()
+    _, factors, _, damping = _linearised(cast(WindowSolver, solver), np.zeros((4, 3, 1)))
+    assert factors is not None
+    assert damping > 0.0
+    assert solver.kept == [0, 0]
