@@ -113,7 +113,9 @@ class StudyRun(BaseModel):
 class ScaledModel(BaseModel):
     """The time of a solve at one size of a problem."""
 
-    variable: Literal["n_u", "n_t", "horizon", "grasps"] = Field(description="The size that varies.", examples=["n_u"])
+    variable: Literal["n_u", "n_u in space", "n_t", "horizon", "grasps"] = Field(
+        description="The size that varies.", examples=["n_u"]
+    )
     value: float = Field(description="Its value.", examples=[25])
     method: str = Field(description="How it was solved.", examples=["march"])
     wall_time: float = Field(description="Time of a march, or of an iteration [s].", examples=[0.003])

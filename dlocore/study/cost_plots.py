@@ -89,6 +89,7 @@ def effect_costs(study: Study) -> Figure:
 
 _VARIABLES = {
     "n_u": "control points along the cable n_u [-]",
+    "n_u in space": "control points along a cable in space with twist n_u [-]",
     "n_t": "control points in time n_t [-]",
     "horizon": "horizon at equal spacing in time [s]",
     "grasps": "number of grasps [-]",
@@ -97,7 +98,8 @@ _VARIABLES = {
 
 def scaling(study: Study) -> Figure:
     """Draw the cost against n_u, n_t, horizon and number of grasps, with the exponents of fitted power laws."""
-    figure, panels = new_figure(10.5, 7.6, 2, 2)
+    figure, (*panels, spare) = new_figure(15.5, 7.6, 2, 3)
+    spare.remove()
     for axes, (variable, label) in zip(panels, _VARIABLES.items(), strict=True):
         rows = [row for row in study.scaling if row.variable == variable]
         methods = dict.fromkeys(row.method for row in rows)

@@ -80,7 +80,7 @@ class Scaled:
     """The time of a solve at one value of the quantity against which its cost is measured.
 
     Attributes:
-        variable: "n_u", "n_t", "horizon" or "grasps".
+        variable: "n_u", "n_u in space", "n_t", "horizon" or "grasps".
         value: its value; the horizon in s.
         method: how it was solved.
         wall_time: the median of the repeats; of a single iteration if the method iterates [s].

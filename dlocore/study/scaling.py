@@ -11,7 +11,10 @@ from dlocore.scene.paths import Move, Waypoints
 from dlocore.scene.scene import Environment, Grasp, Method, Points, Quality, Scene, Straight, Switch, Table
 from dlocore.study.scenes import hanging, paper_case, plain_cord
 
-N_U = (9, 13, 17, 25, 33, 49, 65, 97, 129)
+N_U: dict[Method, tuple[int, ...]] = {
+    "march": (9, 13, 17, 25, 33, 49, 65, 97, 129),
+    "spacetime": (9, 13, 17, 25, 33, 49, 65),  # beyond, a solve takes minutes
+}
 N_T = (13, 25, 49, 97, 193, 385)
 HORIZONS = (2.0, 4.0, 8.0, 16.0, 32.0)  # [s]
 GRASPS = (1, 2, 4, 8, 16)
@@ -54,10 +57,10 @@ def sizes() -> Iterator[Size]:
 
     methods: tuple[Method, ...] = ("march", "spacetime")
     for method in methods:
-        most = 49 if method == "spacetime" else 129
-        for n_u in N_U:
-            if n_u <= most:
-                yield Size("n_u", n_u, asked(paper_case(0.25), method, n_u, 25))
+        for n_u in N_U[method]:
+            yield Size("n_u", n_u, asked(paper_case(0.25), method, n_u, 25))
+        for n_u in N_U[method]:
+            yield Size("n_u in space", n_u, asked(hanging("clamp"), method, n_u, 25))
         for n_t in N_T:
             yield Size("n_t", n_t, asked(paper_case(0.25), method, 13, n_t))
         for horizon in HORIZONS:

@@ -32,7 +32,7 @@ def study(**parts: object) -> Study:
         "measured_at": "2026-01-31T12:00:00Z", "duration": 1.0, "judge": "march", "runs": tuple(runs),
         "scaling": tuple(
             Scaled(variable=v, value=x, method="march", wall_time=1e-3 * x**1.5, spread=1e-5)
-            for v in ("n_u", "n_t", "horizon", "grasps") for x in (2.0, 4.0, 8.0, 16.0)
+            for v in ("n_u", "n_u in space", "n_t", "horizon", "grasps") for x in (2.0, 4.0, 8.0, 16.0)
         ),
         "effects": (EffectCost(effect="drag", present=2e-3, absent=1e-3),),
     }  # fmt: skip

@@ -240,7 +240,7 @@ def test_sizes_and_effects_are_solvable_and_differ_in_what_they_say() -> None:
     for size in sizes():
         key = (size.variable, size.scene.quality.method)
         least_and_most[key] = (least_and_most.get(key, (size,))[0], size)
-    assert len(least_and_most) == 8
+    assert len(least_and_most) == 10
     for least, most in least_and_most.values():
         assert least.value < most.value
         assert predict(least.scene).status == "converged", least
