@@ -4,6 +4,9 @@ Each scene is solved by the march that `auto` takes for the target error, 0.1 % 
 `method="reference"` for a third of it. The table has the estimated error of the reference, the march's own estimate,
 the largest distance between the two anywhere, and their times. The scenes are the example requests of the API and those
 of the catalogue that are named here, in the plane and in space, with every effect that the reference has.
+
+With `--equal-error`, the march is compared with the fastest single simulation of a rod whose error is at most that of
+the march (`benchmarks/equal_error.py`).
 """
 
 import argparse
@@ -16,6 +19,7 @@ import numpy as np
 from app.schemas import PredictionRequest, to_scene
 from app.schemas.request import EXAMPLES
 from benchmarks.catalogue import catalogue
+from benchmarks.equal_error import compare
 from benchmarks.machine import machine_line
 from dlocore import Prediction, Quality, Scene, predict
 
@@ -72,6 +76,31 @@ def distance(a: Prediction, b: Prediction) -> float:
     return float(np.linalg.norm(a.surface.positions(u, t) - b.surface.positions(u, t), axis=-1).max())
 
 
+def at_equal_error(names: list[str]) -> None:
+    """Print what the march and the fastest rod that errs as little take."""
+    found = examples() | catalogue()
+    print("lengths in mm, processor times in ms; target 0.1 % of the length")
+    print("| scene | march | truth moved | with estimate | alone | rod | elements | steps | time | ratio | to alone |")
+    print("|" + "---|" * 11)
+    ratios = []
+    for name in names or [*examples(), *SCENES]:
+        equal = compare(found[name], TARGET * found[name].cable.length, PATIENCE)
+        cells = [name, *(f"{1e3 * x:.3g}" for x in (equal.error, equal.unsure, equal.march, equal.alone))]
+        if equal.rod is None:
+            cells += ["not reached", "", "", "", "", ""]
+        else:
+            seconds, error, elements, steps = equal.rod
+            ratios.append((seconds / equal.march, seconds / equal.alone))
+            cells += [f"{1e3 * error:.3g}", str(elements), str(steps), f"{1e3 * seconds:.3g}"]
+            cells += [f"{ratio:.0f}" for ratio in ratios[-1]]
+        print("| " + " | ".join(cells) + " |", flush=True)
+    if ratios:
+        for what, of in zip(("with its estimate", "alone"), np.transpose(ratios), strict=True):
+            over = f"at least 100 in {int((of >= 100.0).sum())} of {len(of)}"
+            print(f"\nrod over march {what}: median {np.median(of):.0f}, {of.min():.0f} to {of.max():.0f}, {over}")
+    print(machine_line())
+
+
 def main(names: list[str]) -> None:
     found = examples() | catalogue()
     simple = found["paper case at a quarter"]
@@ -102,8 +131,10 @@ if __name__ == "__main__":
     parser.add_argument(
         "scenes", nargs="*", metavar="SCENE", help="names of scenes; absent: those that this file names"
     )
-    scenes = parser.parse_args().scenes
+    parser.add_argument("--equal-error", action="store_true", help="compare with the fastest rod of the same error")
+    options = parser.parse_args()
+    scenes = options.scenes
     unknown = set(scenes) - set(examples() | catalogue())
     if unknown:
         parser.error(f"no such scene: {', '.join(sorted(unknown))}")
-    main(scenes)
+    at_equal_error(scenes) if options.equal_error else main(scenes)
