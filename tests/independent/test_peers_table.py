@@ -47,7 +47,11 @@ def test_a_cell_is_the_median_time_with_the_median_ratio_or_says_what_is_missing
 def test_where_a_peer_is_faster_the_text_says_so():
     text = results().text()
     assert "MuJoCo chain is faster than dlocore in 3 of 8: 1 at 10 mm, 1 at 3 mm, 1 at 1 mm" in text
-    assert "PyElastica is faster than dlocore in 0 of 8" in text
+    assert "PyElastica is faster than dlocore in 0 of 8; it is below 10x in 0." in text
+
+
+def test_where_dlocore_is_not_as_many_times_faster_as_it_is_meant_to_be_the_text_says_so():
+    assert "1 at 1 mm; it is below 10x in 4." in results().text()  # that one, and the other case at 10 mm
 
 
 def test_a_simulation_that_blew_up_never_wins():
