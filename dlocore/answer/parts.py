@@ -246,6 +246,7 @@ class Accuracy:
             "neglected": effects that "auto" left out;
             "start": if the scene does not determine its motion, how far an almost equal start takes it elsewhere;
             "contact": for a motion that strikes something, how far contact twice as stiff would change it.
+            An effect that the scene switches off has no part; a note in the message reports it if it matters.
         neglected: approximate error due to effects that "auto" left out [m], a part of the estimate.
         wall_time: time of the whole solve [s].
         n_u, n_t: size of the net of control points.

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.hard.laws import measure
 from dlocore import Environment, Grasp, Move, Prediction, Quality, Scene, SplineSurface, Straight, predict
+from dlocore.study.scenes import paper_case
 from tests.hard.checks import GAIN, HELD, LOST, STRAIN, keep_laws
 from tests.solver.scenes import Floats, cable
 
@@ -45,6 +46,15 @@ def test_a_stretched_cable_is_noticed(sound: Prediction):
 
 def test_a_gripper_that_slips_by_a_micrometre_is_noticed(sound: Prediction):
     assert measure(with_control(sound, sound.surface.control_points + 1e-6)).held > HELD
+
+
+@pytest.mark.parametrize(("n_t", "least", "most"), [(13, 2e-5, 3e-5), (25, 5e-7, 1e-6)])
+def test_between_its_ends_a_smooth_path_is_missed_by_as_much_as_the_docs_say(n_t: int, least: float, most: float):
+    """Minimum jerk is of the fifth degree, the time spline of the third."""
+    quality = Quality(n_u=9, n_t=n_t, method="march", estimate=False, keep_grid=True)
+    found = measure(predict(replace(paper_case(0.25), quality=quality)))
+    assert found.held < HELD
+    assert least < found.held_between < most
 
 
 @pytest.mark.parametrize("factor", [0.0, 0.7, -1.0])
