@@ -28,10 +28,10 @@ class Measured:
 
     Attributes:
         dimensions: 2 in the plane (the paper's case, four grasps), 3 in space (a cable between two grippers).
-        method: "march" or "spacetime".
-        n_u, n_t: control points along the cable and in time.
+        method: "march" or "spacetime"; "auto" of the default quality, which chooses its own grids.
+        n_u, n_t: control points along the cable and in time; of "auto" the most of the scenes.
         steps: time steps of the march.
-        wall_time: time of a solve without error estimate [s], the median over repeats and scenes.
+        wall_time: median time of a solve over repeats and scenes [s]; of "auto" with error estimate, else without.
         spread: median absolute deviation of the repeats [s], the largest of the scenes.
         error: largest distance to the converged motion [m], the largest of the scenes.
         iterations: iterations of the least squares, the most of the scenes; 0 for a march.
@@ -62,6 +62,7 @@ class Calibration:
         duration: how long the measurement took [s].
         points: the measured points.
         cost: the model of the time of a solve.
+        defaults: what the default quality takes and reaches, in the plane and in space; none of an earlier version.
     """
 
     machine: dict[str, str]
@@ -71,6 +72,7 @@ class Calibration:
     duration: float
     points: tuple[Measured, ...]
     cost: Cost
+    defaults: tuple[Measured, ...] = ()
 
     @property
     def current(self) -> bool:
@@ -134,6 +136,7 @@ def stored_cost(path: Path | None = None) -> Cost | None:
 
 
 STAR = "no other one is both faster and more accurate"  # meaning of the star in the table
+AUTO = "auto: the default quality on grids of its own choice, with error estimate; the others are without"
 
 
 def table(calibration: Calibration) -> str:
@@ -143,11 +146,11 @@ def table(calibration: Calibration) -> str:
         points = calibration.of_dimensions(dimensions)
         front = set(front_of(points))
         lines.append(title)
-        for i, p in enumerate(points):
+        for i, p in enumerate([*points, *(p for p in calibration.defaults if p.dimensions == dimensions)]):
             mark = "*" if i in front else ""
             times = f"{1e3 * p.wall_time:10.3g} {1e3 * p.error:11.3g}"
             lines.append(f"{mark:2}{p.method:10} {p.n_u:4} {p.n_t:4} {times}" + ("" if p.converged else "  not solved"))
-    return "\n".join([*lines, f"* {STAR}"])
+    return "\n".join([*lines, f"* {STAR}", AUTO])
 
 
 def to_document(calibration: Calibration) -> dict[str, Any]:
@@ -175,6 +178,7 @@ def from_document(document: dict[str, Any]) -> Calibration:
         duration=document["duration"],
         points=tuple(Measured(**point) for point in document["points"]),
         cost=Cost(**(cost | {"rates": rates})),
+        defaults=tuple(Measured(**point) for point in document.get("defaults", ())),
     )
 
 

@@ -18,7 +18,8 @@ let pointed = -1;
 
 function words(point) {
   const failed = point.converged === false ? ", did not converge" : "";
-  return `${point.method}, ${point.n_u} × ${point.n_t}: ${short(point.x)} ms, ${short(point.y)} mm${failed}`;
+  const what = point.label ? `${point.label}, with error estimate` : `${point.method}, ${point.n_u} × ${point.n_t}`;
+  return `${what}: ${short(point.x)} ms, ${short(point.y)} mm${failed}`;
 }
 
 function show(index) {
@@ -51,7 +52,7 @@ function entry(method) {
   swatch.setAttribute("viewBox", "-8 -8 16 16");
   swatch.setAttribute("aria-hidden", "true");
   swatch.append(sign(method, 0, 0, 5));
-  return make("li", {}, swatch, method);
+  return make("li", {}, swatch, method === "auto" ? "default quality, with error estimate" : method);
 }
 
 function row(point) {
@@ -62,8 +63,9 @@ function row(point) {
 
 function present(calibration) {
   const best = new Set(calibration.front);
-  points = calibration.points
-    .map((point, index) => ({ ...point, x: point.wall_time * 1e3, y: point.error * 1e3, best: best.has(index) }))
+  const own = calibration.default ? [{ ...calibration.default, label: "default quality" }] : [];
+  points = [...calibration.points.map((point, index) => ({ ...point, best: best.has(index) })), ...own]
+    .map((point) => ({ ...point, x: point.wall_time * 1e3, y: point.error * 1e3 }))
     .filter((point) => point.x > 0 && point.y > 0)
     .sort((one, other) => one.x - other.x);
   if (points.length === 0) return;

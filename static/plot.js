@@ -5,8 +5,8 @@ import { make, short } from "./dom.js";
 const SVG = "http://www.w3.org/2000/svg";
 const MARGIN = { left: 58, right: 18, top: 16, bottom: 50 };
 const REACH = 40; // px: the pointer selects a point within this distance
-const SHAPES = ["circle", "square"]; // they tell methods apart in addition to the colour
-export const METHODS = ["march", "spacetime"]; // the methods that a calibration measures
+const SHAPES = ["circle", "square", "diamond"]; // they tell methods apart in addition to the colour
+export const METHODS = ["march", "spacetime", "auto"]; // the methods that a calibration measures
 
 function svg(tag, attributes, ...children) {
   const element = document.createElementNS(SVG, tag);
@@ -16,6 +16,7 @@ function svg(tag, attributes, ...children) {
 }
 
 function outline(shape, x, y, r) {
+  if (shape === "diamond") return `M${x - 1.3 * r} ${y}l${1.3 * r} ${-1.3 * r}l${1.3 * r} ${1.3 * r}l${-1.3 * r} ${1.3 * r}z`;
   if (shape === "square") return `M${x - r} ${y - r}h${2 * r}v${2 * r}h${-2 * r}z`;
   return `M${x - r} ${y}a${r} ${r} 0 1 1 ${2 * r} 0a${r} ${r} 0 1 1 ${-2 * r} 0z`;
 }
@@ -45,7 +46,10 @@ function logScale(values, from, to) {
   return { place, ticks };
 }
 
-/** Draw `points` ({method, x [ms], y [mm], best, converged}), the fastest first, into `box`; `words` describes a point. */
+/**
+ * Draw `points` ({method, x [ms], y [mm], best, converged, label}), the fastest first, into `box`; `words` describes a
+ * point. A `label` stands beside its point.
+ */
 export function drawPlot(box, points, words) {
   const width = Math.max(280, box.clientWidth);
   const height = Math.round(Math.min(440, Math.max(280, 0.5 * width)));
@@ -74,7 +78,11 @@ export function drawPlot(box, points, words) {
   const signs = svg("g", {});
   for (const point of points) {
     const rank = point.best ? "best" : point.converged === false ? "failed" : "";
-    signs.append(sign(point.method, x.place(point.x), y.place(point.y), point.best ? 5.5 : 4.5, rank));
+    const [left, top] = [x.place(point.x), y.place(point.y)];
+    signs.append(sign(point.method, left, top, point.best || point.label ? 5.5 : 4.5, rank));
+    if (!point.label) continue;
+    const beyond = left > 0.6 * width;
+    signs.append(svg("text", { x: left + (beyond ? -12 : 12), y: top - 8, "text-anchor": beyond ? "end" : "start", class: "label" }, point.label));
   }
   const ring = svg("circle", { r: 11, class: "ring", visibility: "hidden" });
   const drawing = svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, "aria-hidden": "true" }, grid, front, signs, ring);
@@ -111,7 +119,7 @@ export function drawPlot(box, points, words) {
 
 /** The finding in words: the fastest solves within 1 and 0.1 mm, or else the most accurate one. */
 export function finding(points) {
-  const solved = points.filter((point) => point.converged !== false);
+  const solved = points.filter((point) => point.converged !== false && point.method !== "auto"); // without estimates
   const said = [1, 0.1].flatMap((error) => {
     const within = solved.filter((point) => point.y <= error).map((point) => point.x);
     return within.length === 0 ? [] : [`within ${error} mm in ${short(Math.min(...within))} ms`];

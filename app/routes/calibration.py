@@ -33,6 +33,10 @@ KIND = "calibration"
 def document_of(found: Calibration, dimensions: int) -> dict[str, Any]:
     """Return the points of a calibration for motions of some dimensions, and which of them are on the Pareto front."""
     points = found.of_dimensions(dimensions)
+
+    def plain(point: calibration.Measured) -> dict[str, Any]:
+        return {name: value for name, value in vars(point).items() if name != "dimensions"}
+
     return {
         "machine": found.machine,
         "version": found.version,
@@ -40,8 +44,9 @@ def document_of(found: Calibration, dimensions: int) -> dict[str, Any]:
         "duration": found.duration,
         "current": found.current,
         "dimensions": dimensions,
-        "points": [{name: value for name, value in vars(p).items() if name != "dimensions"} for p in points],
+        "points": [plain(p) for p in points],
         "front": calibration.front_of(points),
+        "default": next((plain(p) for p in found.defaults if p.dimensions == dimensions), None),
     }
 
 

@@ -10,12 +10,15 @@ from app.schemas.response import ProblemDocument
 class CalibrationPoint(BaseModel):
     """One method on one grid, measured over the scenes of the calibration."""
 
-    method: Literal["march", "spacetime"] = Field(description="How it was solved.", examples=["march"])
-    n_u: int = Field(description="Control points along the cable.", examples=[13])
-    n_t: int = Field(description="Control points in time.", examples=[19])
+    method: Literal["march", "spacetime", "auto"] = Field(
+        description="How it was solved; `auto` is the default quality, which chooses its own grids.", examples=["march"]
+    )
+    n_u: int = Field(description="Control points along the cable; of `auto` the most of the scenes.", examples=[13])
+    n_t: int = Field(description="Control points in time; of `auto` the most of the scenes.", examples=[19])
     steps: int = Field(description="Time steps of the march.", examples=[95])
     wall_time: float = Field(
-        description="Median time of a solve without error estimate, on a core of its own [s].", examples=[0.0023]
+        description="Median time of a solve on a core of its own [s]: of `auto` with error estimate, of the others without.",
+        examples=[0.0023],
     )
     spread: float = Field(description="Median absolute deviation of the repeats [s].", examples=[0.0001])
     error: float = Field(description="Largest distance to the converged motion [m].", examples=[4.7e-4])
@@ -44,6 +47,10 @@ class CalibrationResponse(BaseModel):
     front: list[int] = Field(
         description="Indices of the points that no other point beats in both time and error, fastest first.",
         examples=[[0, 1, 2]],
+    )
+    default: CalibrationPoint | None = Field(
+        description="What a scene without a `quality` takes and reaches; null where it was not measured yet.",
+        examples=[None],
     )
 
 

@@ -37,11 +37,11 @@ _PATIENCE = 0.4  # [s] for the repeats of one solve
 
 @dataclass(frozen=True, kw_only=True)
 class _Run:
-    """One repeated solve: the scene, the grid, and the result."""
+    """One repeated solve: the scene, the grid if one is given, and the result."""
 
     dimensions: int
     method: Method
-    grid: Grid
+    grid: Grid | None
     prediction: Prediction
     times: Times
     error: float
@@ -49,8 +49,8 @@ class _Run:
     def sample(self, coordinates: int) -> Sample:
         return Sample(
             coordinates=coordinates,
-            n_u=self.grid[0],
-            n_t=self.grid[1],
+            n_u=self.prediction.accuracy.n_u,
+            n_t=self.prediction.accuracy.n_t,
             steps=self.prediction.accuracy.steps,
             iterations=0 if self.method == "march" else len(self.prediction.iterations),
             wall_time=self.times.median,
@@ -76,11 +76,16 @@ class _Course:
     def run(self, name: str, scene: Scene, method: Method, grid: Grid, truth: Truth | None = None, **on: bool) -> _Run:
         """Solve a scene on one grid, without an error estimate unless `estimate` is on."""
         self.next(f"{name}: {method}, {grid[0]} x {grid[1]}")
-        quality = Quality(n_u=grid[0], n_t=grid[1], method=method, estimate=on.get("estimate", False))
-        asked = replace(scene, quality=quality)
-        prediction, times = timed(
-            lambda: predict(asked, cancelled=self.cancelled, keep_grid=True), self.repeats, _PATIENCE
-        )
+        quality = Quality(n_u=grid[0], n_t=grid[1], method=method, estimate=on.get("estimate", False), keep_grid=True)
+        return self._timed(replace(scene, quality=quality), method, grid, truth)
+
+    def default(self, name: str, scene: Scene, truth: Truth) -> _Run:
+        """Solve a scene by the default quality, with its error estimate."""
+        self.next(f"{name}: quality auto")
+        return self._timed(replace(scene, quality=Quality()), "auto", None, truth)
+
+    def _timed(self, asked: Scene, method: Method, grid: Grid | None, truth: Truth | None) -> _Run:
+        prediction, times = timed(lambda: predict(asked, cancelled=self.cancelled), self.repeats, _PATIENCE)
         return _Run(
             dimensions=prediction.accuracy.dimensions,
             method=method,
@@ -110,16 +115,18 @@ def measure(
     began = time.perf_counter()
     scenes, effects = accuracy_scenes(), effect_scenes()
     grids = sum(len(g) for g in GRIDS.values())
-    parts = len(scenes) * (1 + grids) + sum(len(g) for g in _TWIST_GRIDS.values())
+    parts = len(scenes) * (2 + grids) + sum(len(g) for g in _TWIST_GRIDS.values())
     parts += (1 + len(effects)) * len(_EFFECT_GRIDS) + 4 * len(_ESTIMATE_GRIDS)
     course = _Course(parts + 1, repeats, on_progress, cancelled)
     course.next("compiling")
     warm_up()
-    runs = []
+    runs: list[_Run] = []
+    defaults: list[_Run] = []
     for name, scene in scenes.items():
         course.next(f"{name}: the converged motion")
         truth = finest_march(scene, cancelled=cancelled)
         runs += [course.run(name, scene, method, grid, truth) for method in GRIDS for grid in GRIDS[method]]
+        defaults.append(course.default(name, scene, truth))
     twisted = hanging("clamp")
     samples = [run.sample(run.dimensions) for run in runs]
     for method, some in _TWIST_GRIDS.items():
@@ -134,28 +141,29 @@ def measure(
         duration=time.perf_counter() - began,
         points=tuple(_points(runs)),
         cost=replace(cost, deviation=_deviation(cost, samples)),
+        defaults=tuple(_points(defaults)),
     )
 
 
 def _points(runs: list[_Run]) -> list[Measured]:
-    """Return one point for each kind of motion, method and grid: median time and largest error over its scenes."""
-    groups: dict[tuple[int, Method, Grid], list[_Run]] = {}
+    """Return one point for each kind of motion, method and grid asked for: median time, largest error."""
+    groups: dict[tuple[int, Method, Grid | None], list[_Run]] = {}
     for run in runs:
         groups.setdefault((run.dimensions, run.method, run.grid), []).append(run)
     return [
         Measured(
             dimensions=dimensions,
             method=method,
-            n_u=grid[0],
-            n_t=grid[1],
+            n_u=max(run.prediction.accuracy.n_u for run in group),
+            n_t=max(run.prediction.accuracy.n_t for run in group),
             steps=max(run.prediction.accuracy.steps for run in group),
             wall_time=float(np.median([run.times.median for run in group])),
             spread=max(run.times.spread for run in group),
             error=max(run.error for run in group),
-            iterations=0 if method == "march" else max(len(run.prediction.iterations) for run in group),
+            iterations=max(len(run.prediction.iterations) for run in group) if method == "spacetime" else 0,
             converged=all(run.prediction.status == "converged" for run in group),
         )
-        for (dimensions, method, grid), group in groups.items()
+        for (dimensions, method, _), group in groups.items()
     ]
 
 

@@ -38,7 +38,7 @@ class Run:
         steps: time steps of the march.
         status: of the prediction.
         wall_time: of one solve on a core of its own, the median of the repeats [s].
-        spread: half the width of the range that contains half of the repeats [s].
+        spread: median absolute deviation of the repeats [s].
         repeats: timed calls.
         error: largest distance to the truth over cable and time [m].
         rms: root mean square distance [m].
@@ -84,7 +84,7 @@ class Scaled:
         value: its value; the horizon in s.
         method: how it was solved.
         wall_time: the median of the repeats; of a single iteration if the method iterates [s].
-        spread: half the width of the range that contains half of the repeats [s].
+        spread: median absolute deviation of the repeats [s].
     """
 
     variable: str

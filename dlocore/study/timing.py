@@ -17,7 +17,7 @@ clock = time.thread_time if time.get_clock_info("thread_time").resolution <= _FI
 
 
 class Times(NamedTuple):
-    """Times of repeated calls [s]: their median, half the width of the range of half of them, and their number."""
+    """Times of repeated calls [s]: their median, their median absolute deviation, and their number."""
 
     median: float
     spread: float

@@ -71,9 +71,12 @@ def test_its_progress_ends_with_what_is_then_read(fresh: TestClient) -> None:
     assert {p["method"] for p in plane["points"]} == {"march", "spacetime"}
     assert len(plane["points"]) == 5
     assert all(0 <= i < 5 for i in plane["front"])
+    assert plane["default"]["method"] == "auto"
+    assert 0.0 < plane["default"]["error"] < 2e-3
     space = fresh.get(ADDRESS, params={"dimensions": 3}).json()
     assert space["dimensions"] == 3
     assert space["points"] != plane["points"]
+    assert space["default"] != plane["default"]
     the_problem(fresh.get(ADDRESS, params={"dimensions": 4}), 422)
     again = parsed(fresh.get(f"{ADDRESS}/events", headers={"last-event-id": "2"}).text)
     assert [data["number"] for kind, _, data in again if kind == "progress"] == list(range(3, len(news)))

@@ -27,6 +27,7 @@ CALIBRATION = {
     ],
     "front": [1, 2, 0],
 }
+DEFAULT = {"method": "auto", "n_u": 19, "n_t": 28, "wall_time": 0.02, "error": 2e-4}
 CALIBRATED = re.compile(r"/v1/calibration\?")
 
 
@@ -283,6 +284,24 @@ def test_pointing_at_a_point_and_walking_by_arrow_keys_tell_its_values(service, 
     page.keyboard.press("Home")
     page.keyboard.press("ArrowRight")
     expect(page.locator("#plot .tip")).to_have_text("march, 17 × 25: 10 ms, 0.3 mm")
+
+
+def test_the_default_quality_is_a_dot_with_a_label(service, witness):
+    page = witness.page
+    asks_for_calibration(page)
+    page.route(CALIBRATED, lambda route: route.fulfill(json={**CALIBRATION, "default": DEFAULT}))
+    open_page(witness, service)
+    expect(page.locator("#plot .sign")).to_have_count(len(CALIBRATION["points"]) + 1)
+    expect(page.locator("#plot .label")).to_have_text("default quality")
+    page.locator("#plot .sign.auto").hover()
+    expect(page.locator("#plot .tip")).to_have_text("default quality, with error estimate: 20 ms, 0.2 mm")
+    expect(page.locator("#plot-legend li")).to_contain_text(
+        ["march", "spacetime", "default quality, with error estimate", "the best in its time"]
+    )
+    expect(page.locator("#plot-finding")).to_have_text("Within 1 mm in 10 ms, within 0.1 mm in 100 ms")
+    page.get_by_text("The same as a table").click()
+    rows = [row.split("\t") for row in page.locator("#plot-table tbody tr").all_inner_texts()]
+    assert ["auto", "19", "28", "20", "0.2", ""] in rows
 
 
 # --- recent runs ---

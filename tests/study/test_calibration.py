@@ -39,10 +39,25 @@ def test_the_front_leaves_out_what_another_point_beats(measured: Calibration) ->
     assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
 
 
+def test_the_default_quality_is_measured_with_its_estimate_beside_the_grids(measured: Calibration) -> None:
+    assert [(p.method, p.dimensions, p.converged) for p in measured.defaults] == [("auto", 2, True), ("auto", 3, True)]
+    for point in measured.defaults:
+        assert 0.0 < point.error < 2e-3  # the target, where none is given
+        assert point.wall_time > 0.0
+        assert point.n_u >= 9
+
+
+def test_a_calibration_of_a_version_before_is_read(measured: Calibration) -> None:
+    document = calibration.to_document(measured)
+    del document["defaults"]
+    assert calibration.from_document(document) == replace(measured, defaults=())
+
+
 def test_the_table_says_what_its_stars_mean(measured: Calibration) -> None:
     lines = calibration.table(measured).splitlines()
-    assert lines[-1] == f"* {calibration.STAR}"
-    starred = sum(line.startswith("* ") for line in lines[:-1])
+    assert lines[-2:] == [f"* {calibration.STAR}", calibration.AUTO]
+    assert sum(line.startswith("  auto") for line in lines) == 2
+    starred = sum(line.startswith("* ") for line in lines[:-2])
     assert starred == sum(len(calibration.front_of(measured.of_dimensions(dimensions))) for dimensions in (2, 3))
 
 
