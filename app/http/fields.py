@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from app.schemas.base import MAX_NAMES, MAX_REPORTED, RUN_ID
 from app.schemas.request import PredictionRequest
 from dlocore import SceneError
+from dlocore.words import counted
 
 _WHOLE = "body"
 _SHAPE = re.compile(r"shape \(([0-9, ]+)\)")
@@ -118,7 +119,7 @@ def _text(steps: list[Any]) -> str:
 
 def _shown(value: Any, kind: str) -> str:
     if kind in ("too_short", "too_long") and isinstance(value, list):
-        return f"{len(value)} items"
+        return counted(len(value), "item")
     text = _written(_as_json(value))
     return text if len(text) <= 120 else text[:117] + "..."
 
@@ -214,6 +215,8 @@ def _allowed(kind: str, context: dict[str, Any], loc: list[Any], whole: "_Schema
 
 def _bounds(context: dict[str, Any], least: str, most: str, form: str) -> str:
     low, high = context.get(least), context.get(most)
+    if (high if low is None else low) == 1:
+        form = form.removesuffix("s")
     if low is not None and low == high:
         return form.format(low)
     return form.format(f"at least {low}" if low is not None else f"at most {high}")

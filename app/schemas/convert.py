@@ -44,6 +44,7 @@ from dlocore.errors import within
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Path
 from dlocore.scene.scene import Shape, load_times
+from dlocore.words import counted
 
 
 class Motion(NamedTuple):
@@ -188,7 +189,7 @@ def load_of(i: int, model: LoadModel) -> Load:
             return Load(u=model.u, force=model.force)
     count, values = len(model.force.times), model.force.values
     if count != len(values):
-        raise SceneError(f"{prefix}.force.values", f"{len(values)} forces", f"as many as times ({count})")
+        raise SceneError(f"{prefix}.force.values", counted(len(values), "force"), f"as many as times ({count})")
     times = load_times(f"{prefix}.force.times", model.force.times)
     with within(prefix):
         return Load(u=model.u, force=values, times=times)

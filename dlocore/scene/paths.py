@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dlocore.errors import SceneError, array, choice, number
 from dlocore.pickling import Checked
+from dlocore.words import counted
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -31,6 +32,7 @@ _PROFILES: dict[str, tuple[float, ...]] = {
 }
 MAX_WAYPOINTS = 100_000
 MAX_STOPS = 1000  # waypoints at which a gripper stops: each is an event
+SAME_TURN = 1e-9  # [rad]: orientations that differ by less are the same: the gripper does not turn
 DRAWN = 0.2  # [s], in which a gripper that closes beside its first waypoint draws the cable to its path
 STAYS = (1.0, *_PROFILES["linear"], 0.0, 0.0, 0.0)  # a straight move, or a turn about one axis, of zero size
 
@@ -164,7 +166,7 @@ class Waypoints(Checked):
         times = array("times", self.times, shape=(None,), unit="s")
         most = MAX_WAYPOINTS if smooth else MAX_STOPS
         if not 2 <= len(times) <= most:
-            raise SceneError("times", f"{len(times)} times", f'2 to {most} times with profile "{self.profile}"')
+            raise SceneError("times", counted(len(times), "time"), f'2 to {most} times with profile "{self.profile}"')
         if not (np.diff(times) > 1e-6).all():
             k = int(np.argmin(np.diff(times)))
             raise SceneError(f"times[{k + 1}]", times[k + 1], "times that rise by more than 1e-6 s")
@@ -173,17 +175,18 @@ class Waypoints(Checked):
         number("times[-1]", float(times[-1]), above=1e-4, at_most=1e4, unit="s")
         positions = array("positions", self.positions, shape=(None, 3), unit="m")
         if len(positions) != len(times):
-            raise SceneError("positions", f"{len(positions)} positions", f"as many as times ({len(times)})")
+            raise SceneError("positions", counted(len(positions), "position"), f"as many as times ({len(times)})")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         from scipy.interpolate import make_interp_spline  # slow to import, as are the rotations below
 
         spline = self._smoothly(positions) if smooth else make_interp_spline(times, positions, 1)
         object.__setattr__(self, "_spline", spline)
+        object.__setattr__(self, "_turns", None)
         if self.orientations is not None:
             quaternions = array("orientations", self.orientations, shape=(None, 4))
             if len(quaternions) != len(times):
-                raise SceneError("orientations", f"{len(quaternions)} rows", f"as many as times ({len(times)})")
+                raise SceneError("orientations", counted(len(quaternions), "row"), f"as many as times ({len(times)})")
             norms = np.linalg.norm(quaternions, axis=1)
             if not (np.abs(norms - 1.0) < 1e-3).all():
                 k = int(np.argmax(np.abs(norms - 1.0)))
@@ -193,7 +196,8 @@ class Waypoints(Checked):
 
             given = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
             turns = given * given[0].inv()
-            object.__setattr__(self, "_turns", self._smoothly(_nearest(turns)) if smooth else Slerp(times, turns))
+            if turns.magnitude().max() > SAME_TURN:
+                object.__setattr__(self, "_turns", self._smoothly(_nearest(turns)) if smooth else Slerp(times, turns))
 
     def _smoothly(self, values: Floats) -> "CubicSpline":
         """Return the C2 cubic spline through values (n, k) at the times; it starts at rest if the path does."""
@@ -220,7 +224,7 @@ class Waypoints(Checked):
     @property
     def turn(self) -> tuple[float, ...] | None:
         """None if the grasp turns, since that is not about a single axis; otherwise a turn of zero size."""
-        return STAYS if self.orientations is None else None
+        return STAYS if self._turns is None else None  # type: ignore[attr-defined]
 
     def _evenly(self, t: Floats) -> Floats:
         """Return the parameters [s] at which to evaluate the spline, or the chords, for the times t (k,) [s]."""
@@ -238,7 +242,7 @@ class Waypoints(Checked):
 
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None if it never turns."""
-        return None if self.orientations is None else self._turned(t).as_matrix()
+        return None if self._turns is None else self._turned(t).as_matrix()  # type: ignore[attr-defined]
 
     def _turned(self, t: Floats) -> "Rotation":
         """Return the rotations (k,) since the first waypoint at times `t` (k,) [s]; only for a path that turns."""
@@ -252,7 +256,7 @@ class Waypoints(Checked):
 
         Between two waypoints the gripper turns the shorter way, so a full turn needs three waypoints or more.
         """
-        if self.orientations is None:
+        if self._turns is None:  # type: ignore[attr-defined]
             return np.zeros(len(t) - 1)
         fine = np.unique(np.concatenate([t, cast(Floats, self.times)]))
         turns = self._turned(fine)

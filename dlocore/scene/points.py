@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dlocore.errors import SceneError, points_array
+from dlocore.words import counted
 
 MIN_POINTS, MAX_POINTS = 4, 100_000
 
@@ -16,7 +17,7 @@ def points_along(field: str, value: ArrayLike) -> NDArray[np.float64]:
     """
     points = points_array(field, value)
     if not MIN_POINTS <= len(points) <= MAX_POINTS:
-        raise SceneError(field, f"{len(points)} points", f"{MIN_POINTS} to {MAX_POINTS} points")
+        raise SceneError(field, counted(len(points), "point"), f"{MIN_POINTS} to {MAX_POINTS} points")
     if not np.ptp(points, axis=0).max() > 1e-9:
         raise SceneError(field, points, "points that are not all the same")
     return points

@@ -28,6 +28,7 @@ from dlocore.scene.cable import MAX_LENGTH, Cable, PointMass
 from dlocore.scene.obstacles import Obstacle
 from dlocore.scene.paths import Move, Path, Still, Waypoints
 from dlocore.scene.points import points_along
+from dlocore.words import counted
 
 Floats = NDArray[np.float64]
 Hold = Literal["point", "tangent", "clamp"]
@@ -204,7 +205,7 @@ def _velocity(value: ArrayLike | None, count: int | None, columns: int = 3) -> F
         return array("velocity", value, shape=(3,), unit="m/s")
     velocity = array("velocity", value, shape=(count, columns), unit="m/s")
     if len(velocity) < 4:
-        raise SceneError("velocity", f"{len(velocity)} rows", "one velocity, or at least 4")
+        raise SceneError("velocity", counted(len(velocity), "row"), "one velocity, or at least 4")
     return velocity
 
 
@@ -231,11 +232,9 @@ class Grasp:
         object.__setattr__(self, "u", number("u", self.u, at_least=0.0, at_most=MAX_LENGTH, unit="m"))
         choice("hold", self.hold, get_args(Hold))
         instance("path", self.path, Path, "Still, Move or Waypoints")
-        if self.hold == "point":
-            turns = any(getattr(self.path, name, None) is not None for name in ("rotation", "orientations"))
-            if turns:
-                name = "path.rotation" if isinstance(self.path, Move) else "path.orientations"
-                raise SceneError(name, "a rotation", 'none with hold "point", or hold "tangent"')
+        if self.hold == "point" and (self.path.turn is None or any(self.path.turn[6:])):
+            name = "path.rotation" if isinstance(self.path, Move) else "path.orientations"
+            raise SceneError(name, "a rotation", 'none with hold "point", or hold "tangent"')
         for name in ("grasp_time", "release_time"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0, at_most=1e4, unit="s"))

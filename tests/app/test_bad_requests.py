@@ -209,6 +209,14 @@ def test_the_scenes_that_the_cases_are_made_of_are_right(client: TestClient, sce
     assert client.post("/v1/predictions", json=scene).status_code == 201
 
 
+def test_one_item_is_said_in_the_singular(client: TestClient) -> None:
+    short = put(PAPER, "primitives.0.path.displacement", [0.1])
+    error = the_problem(client.post("/v1/predictions", json=short), 422)["errors"][0]
+    assert error["message"].startswith("Got 1 item. Allowed: "), error["message"]
+    error = the_problem(client.post("/v1/predictions:batch", json={"scenes": []}), 422)["errors"][0]
+    assert error["message"] == "Got 0 items. Allowed: at least 1 item."
+
+
 def test_what_is_allowed_is_said_with_what_the_field_is_and_no_more(client: TestClient) -> None:
     problem = the_problem(client.post("/v1/predictions", json=put(PAPER, "quality", {"n_u": 500, "n_t": 13})), 422)
     assert problem["errors"][0]["allowed"] == "an integer at least 5 at most 129 (Control points along the cable)"

@@ -107,6 +107,7 @@ BAD: list[tuple[str, Callable[[], object]]] = [
     ("hold", lambda: Grasp(u=0.3, hold="glue")),  # type: ignore[arg-type]
     ("path", lambda: Grasp(u=0.3, path="up")),  # type: ignore[arg-type]
     ("path.rotation", lambda: Grasp(u=0.3, path=Move(displacement=(0, 0, 0), duration=1.0, rotation=(0, 0, 1)))),
+    ("path.orientations", lambda: Grasp(u=0.3, path=Waypoints(times=[0, 1], positions=np.zeros((2, 3)), orientations=[[1, 0, 0, 0], [0, 1, 0, 0]]))),
     ("release_time", lambda: Grasp(u=0.3, grasp_time=1.0, release_time=0.5)),
     ("grasp_time", lambda: Grasp(u=0.3, grasp_time=-1.0)),
     ("duration", lambda: Move(displacement=(0, 0, 0), duration=0.0)),

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from dlocore import Grasp, Move, Scene, Straight, Waypoints
 from dlocore.problem.notes import scene_notes
-from dlocore.scene.paths import Path
+from dlocore.scene.paths import Path, Still, Through
 from tests.solver.scenes import Floats, cable
 
 PLACE = [(0.0, 0.0, 0.0)] * 5
@@ -77,3 +77,16 @@ def test_one_that_begins_at_once_or_waits_for_another_time_is_not() -> None:
     for times in ([0.0, 1.0], [0.5, 2.0]):
         assert notes(Waypoints(times=times, positions=PLACE[:2]), grasp_time=1.0) == []
     assert notes(Waypoints(times=[1.0, 2.0], positions=PLACE[:2])) == []
+
+
+@pytest.mark.parametrize("profile", ["spline", "minimum_jerk"])
+def test_orientations_that_stay_are_no_turn_so_that_a_point_may_be_held(profile: Through) -> None:
+    stays = np.array([[0.6, 0.0, 0.8, 0.0], [-0.6, 0.0, -0.8, 0.0], [0.6, 0.0, 0.8, 0.0]])
+    path = Waypoints(times=[0.0, 0.5, 1.0], positions=PLACE[:3], orientations=stays, profile=profile)
+    times = np.linspace(0.0, 1.0, 5)
+    assert Grasp(u=0.0, path=path).path is path
+    assert path.turn == Still().turn
+    assert path.rotation_at(times) is None
+    assert not path.spin(times, np.eye(3)[[0] * 5]).any()
+    assert np.array_equal(np.asarray(path.orientations), stays)  # as given
+    Grasp(u=0.0, path=Move(displacement=(0.0, 0.1, 0.0), rotation=(0.0, 0.0, 0.0), duration=1.0))
