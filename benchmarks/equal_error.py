@@ -1,7 +1,8 @@
-"""The predictor against one step-by-step simulation with the same error: `benchmarks.reference --equal-error`.
+"""The predictor against the step-by-step reference with the same error: `benchmarks.reference --equal-error`.
 
-The reference estimates its error from ever finer rods. Here it is spared that, and a converged march tells the error of
-each rod: of all rods and tolerances of a step, the fastest is taken whose error is at most that of the march.
+A converged march tells the true errors. With error control, the march to a target is compared with the reference to the
+largest of some targets with which it errs no more. Without, the last grid of that march alone is compared with a single
+rod: of all numbers of elements and tolerances of a step, the fastest whose error is no larger.
 """
 
 import math
@@ -26,6 +27,7 @@ from dlocore.study.timing import clock, timed
 
 RODS = (10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320)  # elements
 STEPS = (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4)  # of the error that is to be met: that of one step
+TARGETS = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)  # times the error that is to be met: those of the reference
 FLAT = 0.03  # relative change of the error by shorter steps that is none
 REPEATS = 5  # of a march: the median of their times counts
 
@@ -47,6 +49,7 @@ class Equal:
         error, unsure: largest error of the march, and by how much the last refinement moved its truth [m].
         march: time of the march with all that a target error takes [s].
         alone: that of its last grid, without an estimate [s].
+        reference: time and error of the reference that errs as little; None where none does in time.
         rod: the fastest that errs as little; None where none was found in time.
     """
 
@@ -54,6 +57,7 @@ class Equal:
     unsure: float
     march: float
     alone: float
+    reference: tuple[float, float] | None
     rod: Trial | None
 
 
@@ -66,13 +70,27 @@ def compare(scene: Scene, target: float, patience: float) -> Equal:
     error = max(largest_error(march, truth), largest_error(alone, truth))
     problem = sided(pose(scene, {e.name: e.reason for e in march.effects if e.active}), Monitor())
     fastest = min(_trials(problem, truth, error, patience), default=None)
-    return Equal(error=error, unsure=truth.moved, march=spent, alone=least, rod=fastest)
+    reference = _refined(scene, truth, error, patience)
+    return Equal(error=error, unsure=truth.moved, march=spent, alone=least, reference=reference, rod=fastest)
 
 
 def _timed(scene: Scene) -> tuple[Prediction, float]:
     """Return a prediction and the median of the processor times that it takes, after a call that is not timed [s]."""
     prediction, times = timed(lambda: predict(scene), REPEATS)
     return prediction, times.median
+
+
+def _refined(scene: Scene, truth: Truth, error: float, patience: float) -> tuple[float, float] | None:
+    """Return time [s] and error [m] of the reference to the largest of TARGETS that keeps its error below `error`."""
+    for share in TARGETS:
+        quality = Quality(method="reference", target_error=max(share * error, 1e-6))
+        began = clock()
+        prediction = predict(replace(scene, quality=quality), deadline=patience)
+        seconds = clock() - began
+        found = largest_error(prediction, truth)
+        if found <= error:
+            return seconds, found
+    return None
 
 
 def _trials(problem: Problem, truth: Truth, error: float, patience: float) -> Iterator[Trial]:
