@@ -17,7 +17,7 @@ class CalibrationPoint(BaseModel):
     n_t: int = Field(description="Control points in time; of `auto` the most of the scenes.", examples=[19])
     steps: int = Field(description="Time steps of the march.", examples=[95])
     wall_time: float = Field(
-        description="Median time of a solve on a core of its own [s]: of `auto` with error estimate, of the others without.",
+        description="Median time of a solve on a core of its own [s]; only `auto` includes its error estimate.",
         examples=[0.0023],
     )
     spread: float = Field(description="Median absolute deviation of the repeats [s].", examples=[0.0001])

@@ -70,7 +70,7 @@ def turned(angle: float, shift: Floats) -> Image:
 
 
 def tilted(turn: ArrayLike, shift: Floats) -> Image:
-    """Return a rotation by a rotation vector (3,) [rad] and a shift. Gravity is rotated too, but a table stays level."""
+    """Return a rotation by a vector (3,) [rad], and a shift; gravity is rotated too, but a table stays level."""
     return Image(frame=Rotation.from_rotvec(turn).as_matrix(), shift=shift)
 
 

@@ -481,7 +481,7 @@ class Scene(Checked):
 
     @property
     def swing(self) -> float:
-        """Approximate period of a swing of a cable of that length under the Earth's gravity [s], whatever the scene's."""
+        """Approximate period of a swing of the cable on Earth [s], whatever the gravity of the scene."""
         return 2.0 * math.sqrt(self.cable.length)
 
     @property
