@@ -16,6 +16,7 @@ Group = Literal["geometry", "stiffness", "motion", "effects", "numbers"]
 
 WEIGHTLESS = Environment(gravity=(0.0, 0.0, 0.0))
 TARGET = 0.005  # of the length: the target error of the cases
+DEEPEST = 0.25 * 0.005  # [m]: a quarter of the diameter of a cord
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +102,6 @@ def at_end(prediction: Prediction, u: Any) -> Floats:
 def samples(prediction: Prediction) -> tuple[Floats, Floats]:
     surface = prediction.surface
     return np.linspace(0.0, surface.length, 65), np.linspace(0.0, surface.horizon, 33)
-
-
-DEEPEST = 0.25 * 0.005  # [m]: a quarter of the diameter of the cord
 
 
 def depth(prediction: Prediction) -> float:
