@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from app.viewer import programs
 from app.viewer.draft import Draft
-from app.viewer.programs import listed
+from app.viewer.rounding import listed
 from dlocore import SplineSurface
 from dlocore.scene.paths import Profile
 from dlocore.shape.shape import StartCurve

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from app.viewer.draft import Draft
+from app.viewer.rounding import rounded
 from dlocore import SceneError
 
 PATH = ("loads",)
@@ -50,7 +51,7 @@ def _force(wanted: Pull) -> Any:
     if wanted.end > 0.0:
         times += [wanted.end - RAMP, wanted.end]
         values += [list(wanted.force), [0.0, 0.0, 0.0]]
-    return {"times": [_rounded(time) for time in times], "values": values}
+    return {"times": [rounded(time) for time in times], "values": values}
 
 
 def added(draft: Draft) -> Draft:
@@ -62,7 +63,7 @@ def added(draft: Draft) -> Draft:
     held = [primitive["u"] for primitive in draft.primitives]
     places = [draft.length, 0.5 * draft.length, 0.0]
     u = max(places, key=lambda place: min((abs(place - other) for other in held), default=0.0))
-    load = {"u": _rounded(u), "force": [0.0, float(f"{SHARE * weight:.2g}"), 0.0]}
+    load = {"u": rounded(u), "force": [0.0, rounded(SHARE * weight, 2), 0.0]}
     return draft.put(PATH, [*loads(draft), load])
 
 
@@ -73,7 +74,7 @@ def removed(draft: Draft, number: int) -> Draft:
 
 def placed(draft: Draft, number: int, u: float) -> Draft:
     """Let a force act at `u` [m]."""
-    u = _rounded(min(u, draft.length))
+    u = rounded(min(u, draft.length))
     return draft.put((*PATH, number, "u"), u) if number < len(loads(draft)) else draft
 
 
@@ -86,7 +87,3 @@ def changed(draft: Draft, number: int, **parts: Any) -> Draft:
 def _vector(values: Any) -> Vector:
     x, y, z = (float(value) for value in values)
     return x, y, z
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.9g}")

@@ -4,16 +4,16 @@ Paths have the form of a scene's document. The positions of a program are world 
 a move. So a program has to be `carried` along when what its gripper holds is moved.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from app.viewer.rounding import listed
+
 Floats = NDArray[np.float64]
 Path = dict[str, Any]
-DIGITS = 6  # of numbers in the document
 HALF_TURN = np.pi * (1.0 + 1e-9)  # rad: two orientations can't express a larger rotation from one to the other
 _STAYS = [1.0, 0.0, 0.0, 0.0]
 
@@ -70,7 +70,7 @@ def turned(path: Path) -> Floats:
     if not path.get("orientations"):
         return np.zeros(3)
     w, x, y, z = path["orientations"][-1]
-    return np.round(Rotation.from_quat([x, y, z, w]).as_rotvec(), DIGITS)
+    return np.array(listed(Rotation.from_quat([x, y, z, w]).as_rotvec()))
 
 
 def turning(path: Path, turn: Floats) -> Path:
@@ -81,12 +81,7 @@ def turning(path: Path, turn: Floats) -> Path:
 
 def carried(path: Path, by: Floats) -> Path:
     """Return a program shifted as a whole by `by` (3,) [m]."""
-    return {**path, "positions": [listed(np.add(position, by)) for position in path["positions"]]}
-
-
-def listed(vector: Sequence[float] | Floats) -> list[float]:
-    """Return numbers for the document, rounded to the micrometre or microradian."""
-    return [round(float(x), DIGITS) + 0.0 for x in vector]
+    return {**path, "positions": listed(np.add(path["positions"], by))}
 
 
 def _of_move(path: Path, begin: Floats) -> Path:
@@ -94,7 +89,7 @@ def _of_move(path: Path, begin: Floats) -> Path:
     program = {
         "kind": "waypoints",
         "times": [0.0, path["duration"]],
-        "positions": [listed(begin), listed(begin + np.array(path["displacement"], dtype=float))],
+        "positions": listed([begin, np.add(begin, path["displacement"])]),
         "profile": path.get("profile", "minimum_jerk"),
     }
     rotation = path.get("rotation")
@@ -102,5 +97,4 @@ def _of_move(path: Path, begin: Floats) -> Path:
 
 
 def _quaternion(turn: Floats) -> list[float]:
-    x, y, z, w = Rotation.from_rotvec(turn).as_quat()
-    return [round(float(value), 9) for value in (w, x, y, z)]
+    return listed(np.roll(Rotation.from_rotvec(turn).as_quat(), 1), 9)

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.draft import Draft
+from app.viewer.rounding import listed
 from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH
 from dlocore.shape.shape import StartCurve
 
 Floats = NDArray[np.float64]
 HANDLES = 13  # points that can be dragged
-STEP = 1e-5  # m to which points are rounded in the document
+DIGITS = 5  # of points in the document: to 10⁻⁵ m
 
 
 def handles(start: StartCurve, length: float) -> Floats:
@@ -43,7 +44,7 @@ def _at_distance(near: Floats, far: Floats, distance: float) -> Floats:
 
 def with_points(draft: Draft, points: Floats) -> Draft:
     """Let the cable start along ordered points (n, 3) [m]; settling stays as it was."""
-    shape: dict[str, Any] = {"kind": "points", "points": _listed(points)}
+    shape: dict[str, Any] = {"kind": "points", "points": listed(points, DIGITS)}
     if draft.get(("shape", "settle")):
         shape["settle"] = True
     return draft.put(("shape",), shape)
@@ -66,7 +67,7 @@ def between(draft: Draft, begin: Floats, end: Floats) -> Draft:
 
 def _line(begin: Floats, along: Floats) -> dict[str, Any]:
     direction = along / np.linalg.norm(along)
-    return {"kind": "straight", "start": _listed(begin[None])[0], "direction": _listed(direction[None])[0]}
+    return {"kind": "straight", "start": listed(begin, DIGITS), "direction": listed(direction, DIGITS)}
 
 
 def with_settling(draft: Draft, settle: bool) -> Draft:
@@ -109,8 +110,3 @@ def scaled(draft: Draft, length: float) -> Draft:
         spaced[-4:] = length
         edited = edited.put(("shape", "knots"), spaced.tolist())
     return edited
-
-
-def _listed(points: Floats) -> list[list[float]]:
-    digits = round(-np.log10(STEP))
-    return [[round(float(x), digits) + 0.0 for x in row] for row in points]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.schemas.describe import from_cable
 from app.viewer.draft import Draft
+from app.viewer.rounding import listed, rounded
 from dlocore import Environment, Prediction, SceneError, Waypoints
 from dlocore.identify import Candidate, Replay, Resolution
 from dlocore.identify.estimate import WINDOW, cable_of
@@ -24,6 +25,7 @@ STEP = 0.02  # s between the grippers' waypoints in the document
 POINTS_IN_SECOND = 25  # control points in time for each second: enough for a cable that swings at 3 Hz
 MOST_IN_TIME = 129
 N_U = 13
+DIGITS = 7  # of points in the document: to 10⁻⁷ m, finer than tracking can measure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,12 +67,12 @@ class Tracked:
         shape, cable, surroundings = cast(ControlPoints, scene.shape), scene.cable, scene.environment
         start: dict[str, Any] = {
             "kind": "control_points",
-            "control_points": _rounded(cast(Floats, shape.control_points)),
+            "control_points": listed(shape.control_points, DIGITS),
             "knots": np.asarray(shape.knots).tolist(),
             "settle": shape.settle,
         }
         if shape.velocity is not None:
-            velocity = _rounded(cast(Floats, shape.velocity))
+            velocity = listed(shape.velocity, DIGITS)
             start["velocity"] = {"kind": "control_points", "control_points": velocity}
         return Draft.of(
             {
@@ -83,8 +85,8 @@ class Tracked:
                 ],
                 "environment": {
                     "gravity": np.asarray(surroundings.gravity).tolist(),
-                    "drag": float(f"{surroundings.drag:.6g}"),
-                    "drag_quadratic": float(f"{surroundings.drag_quadratic:.6g}"),
+                    "drag": rounded(surroundings.drag, 6),
+                    "drag_quadratic": rounded(surroundings.drag_quadratic, 6),
                     "table": None,
                 },
                 "horizon": self._replay.horizon,
@@ -156,12 +158,12 @@ def opened(name: str, content: bytes, beside: dict[str, bytes]) -> Tracked:
 def _path(path: Waypoints) -> dict[str, Any]:
     found: dict[str, Any] = {
         "kind": "waypoints",
-        "times": np.round(np.asarray(path.times, dtype=float), 9).tolist(),
-        "positions": _rounded(cast(Floats, path.positions)),
+        "times": listed(path.times, 9),
+        "positions": listed(path.positions, DIGITS),
         "start": path.start,
     }
     if path.orientations is not None:
-        found["orientations"] = np.round(cast(Floats, path.orientations), 9).tolist()
+        found["orientations"] = listed(path.orientations, 9)
     return found
 
 
@@ -171,9 +173,4 @@ def _to_nine_digits(part: Any) -> Any:
         return {name: _to_nine_digits(value) for name, value in part.items()}
     if isinstance(part, list):
         return [_to_nine_digits(value) for value in part]
-    return float(f"{part:.9g}") if isinstance(part, float) else part
-
-
-def _rounded(values: Floats) -> list[Any]:
-    """Return numbers for the document, rounded to 10⁻⁷ m, which is finer than tracking can measure."""
-    return cast(list[Any], np.round(values, 7).tolist())
+    return rounded(part) if isinstance(part, float) else part

@@ -9,6 +9,7 @@ from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
+from app.viewer.rounding import rounded
 from app.viewer.shapes import scaled
 from dlocore import PRESETS, Cable, SceneError
 from dlocore.scene.cable import MAX_LENGTH, MIN_LENGTH, STIFFNESSES
@@ -68,7 +69,7 @@ class CableForm(Form):
 
     @staticmethod
     def _with(draft: Draft, name: str, value: float) -> Draft:
-        draft = draft.put(("cable", name), float(f"{value:.9g}"))
+        draft = draft.put(("cable", name), rounded(value))
         for modulus, stiffnesses in STIFFNESSES.items():
             if all(draft.get(("cable", stiffness)) is not None for stiffness in stiffnesses):
                 draft = draft.put(("cable", modulus), None)  # refused beside all that it gives
@@ -92,13 +93,13 @@ class CableForm(Form):
     def _with_connector(self, draft: Draft) -> Draft:
         """Set the mass of the first point mass; a new one goes to the far end, and 0 removes it. Others stay."""
         masses = draft.get(("cable", "point_masses"), [])
-        mass = float(f"{1e-3 * self._connector.value:.9g}")
+        mass = rounded(1e-3 * self._connector.value)
         first = [{"u": masses[0]["u"] if masses else draft.length, "mass": mass}] if mass > 0.0 else []
         return draft.put(("cable", "point_masses"), [*first, *masses[1:]])
 
     def _with_place(self, draft: Draft) -> Draft:
         """Move the first point mass, if there is one."""
-        u = float(f"{min(self._connector_u.value, draft.length):.9g}")
+        u = rounded(min(self._connector_u.value, draft.length))
         there = draft.get(("cable", "point_masses"))
         return draft.put(("cable", "point_masses", 0, "u"), u) if there else draft
 
@@ -151,7 +152,7 @@ class CableForm(Form):
 
 
 def _shown(scale: float, value: float | None) -> float:
-    return float(f"{scale * (value or 0.0):.7g}")
+    return rounded(scale * (value or 0.0), 7)
 
 
 def preset_of(cable: dict[str, Any], kept: dict[str, dict[str, Any]] | None = None) -> str:

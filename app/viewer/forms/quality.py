@@ -8,6 +8,7 @@ from app.viewer.draft import Draft
 from app.viewer.edits import Edits
 from app.viewer.forms.base import Form, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
+from app.viewer.rounding import rounded
 
 Mode = Literal["automatic", "target error", "time budget", "grid"]
 QUALITY = ("quality",)
@@ -49,9 +50,9 @@ class QualityForm(Form):
         given = _given(draft)
         wanted: dict[str, Any] = given if mode == _mode(given) else {}  # keep what has no control here
         if mode == "target error":
-            wanted["target_error"] = float(f"{1e-3 * self._error.value:.9g}")
+            wanted["target_error"] = rounded(1e-3 * self._error.value)
         elif mode == "time budget":
-            wanted["time_budget"] = float(f"{1e-3 * self._budget.value:.9g}")
+            wanted["time_budget"] = rounded(1e-3 * self._budget.value)
         elif mode == "grid":
             wanted["n_u"], wanted["n_t"] = int(self._n_u.value), int(self._n_t.value)
             words = self._delta.value
@@ -68,9 +69,9 @@ class QualityForm(Form):
         mode = _mode(given)
         self._error.high = 1e3 * draft.length
         if mode == "target error":
-            show_value(self._error, float(f"{1e3 * given['target_error']:.7g}"))
+            show_value(self._error, rounded(1e3 * given["target_error"], 7))
         elif mode == "time budget":
-            show_value(self._budget, float(f"{1e3 * given['time_budget']:.7g}"))
+            show_value(self._budget, rounded(1e3 * given["time_budget"], 7))
         elif mode == "grid":
             self._take_grid(given)
         self._take_method(given.get("method", "auto"), METHODS[mode])
