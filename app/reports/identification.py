@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app import svg
 from app.schemas.describe import from_cable
 from dlocore.identify import Fit, Identification
 from dlocore.words import counted
 
 Floats = NDArray[np.float64]
 
-_BLUE, _ORANGE, _GREY = "#0072b2", "#d55e00", "#8a8f98"  # Okabe-Ito
 _LYING = 0.2  # of its width: a cable whose height is less than this lies flat
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c2024}
 h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse;width:100%}
@@ -137,31 +137,27 @@ def _figures(name: str, fit: Fit) -> str:
     return (
         f'<div class="row"><figure>{_over_time(fit.times, distance)}<figcaption>{escape(name)}: median distance of '
         f"the free markers over time</figcaption></figure><figure>{overlay}<figcaption>{escape(caption)}: "
-        f'<span style="color:{_ORANGE}">measured</span>, <span style="color:{_BLUE}">predicted</span></figcaption>'
-        "</figure></div>"
+        f'<span style="color:{svg.ORANGE}">measured</span>, <span style="color:{svg.BLUE}">predicted</span>'
+        "</figcaption></figure></div>"
     )
 
 
 def _over_time(times: Floats, distance: Floats) -> str:
     left, top, width, height = 48.0, 10.0, 360.0, 190.0
-    most = _round_up(float(np.nanmax(distance)))
+    most = svg.round_up(float(np.nanmax(distance)))
     x = left + width * (times - times[0]) / (times[-1] - times[0])
     y = top + height * (1.0 - distance / most)
     lost = np.flatnonzero(np.diff(np.isfinite(y))) + 1
-    lines = [
-        " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(*piece, strict=True))
-        for piece in zip(np.split(x, lost), np.split(y, lost), strict=True)
-        if np.isfinite(piece[1][0])
-    ]
-    parts = [f'<polyline points="{line}" fill="none" stroke="{_BLUE}" stroke-width="1.5"/>' for line in lines]
+    pieces = np.split(np.column_stack([x, y]), lost)
+    parts = [svg.line(piece, svg.BLUE) for piece in pieces if np.isfinite(piece[0, 1])]
     for share in (0.0, 0.5, 1.0):
         at = top + height * (1.0 - share)
-        parts.append(f'<line x1="{left}" x2="{left + width}" y1="{at}" y2="{at}" stroke="#dde"/>')
-        parts.append(_text(left - 6, at + 4, f"{share * most:g}" + (" mm" if share == 1.0 else ""), "end"))
+        parts.append(svg.line([(left, at), (left + width, at)], "#dde", 1.0))
+        parts.append(svg.text(left - 6, at + 4, f"{share * most:g}" + (" mm" if share == 1.0 else ""), "end"))
         when = times[0] + share * (times[-1] - times[0])
-        parts.append(_text(left + share * width, top + height + 16, f"{when:.3g}", "middle"))
-    parts.append(_text(left + width / 2, top + height + 32, "time [s]", "middle"))
-    return _svg(420, 240, parts)
+        parts.append(svg.text(left + share * width, top + height + 16, f"{when:.3g}"))
+    parts.append(svg.text(left + width / 2, top + height + 32, "time [s]"))
+    return _drawing(parts)
 
 
 def _overlay(fit: Fit, frame: int) -> str:
@@ -182,16 +178,13 @@ def _overlay(fit: Fit, frame: int) -> str:
         x = 210.0 + scale * (points[:, 0] - 0.5 * (low[0] + high[0]))
         return np.column_stack([x, 120.0 - scale * (points[:, 1] - 0.5 * (low[1] + high[1]))])
 
-    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in placed(b))
-    parts = [f'<polyline points="{line}" fill="none" stroke="{_BLUE}" stroke-width="2"/>']
-    for (x, y), (p, q) in zip(placed(a), placed(b), strict=True):
-        if np.isfinite(x):
-            parts.append(f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{p:.1f}" y2="{q:.1f}" stroke="{_GREY}"/>')
-            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{_ORANGE}"/>')
-        parts.append(f'<circle cx="{p:.1f}" cy="{q:.1f}" r="2.5" fill="{_BLUE}"/>')
-    parts.append(f'<line x1="10" y1="232" x2="{10 + 0.1 * scale:.1f}" y2="232" stroke="#333" stroke-width="2"/>')
-    parts.append(_text(10, 226, "0.1 m", "start"))
-    return _svg(420, 240, parts)
+    parts = [svg.line(placed(b), svg.BLUE, 2.0)]
+    for there, here in zip(placed(a), placed(b), strict=True):
+        if np.isfinite(there[0]):
+            parts += [svg.line([there, here], svg.GREY, 1.0), svg.dot(there, 4.0, svg.ORANGE)]
+        parts.append(svg.dot(here, 2.5, svg.BLUE))
+    parts += [svg.line([(10, 232), (10 + 0.1 * scale, 232)], "#333", 2.0), svg.text(10, 226, "0.1 m", "start")]
+    return _drawing(parts)
 
 
 def _view(gravity: Floats, points: Floats) -> tuple[Floats, Floats]:
@@ -208,15 +201,5 @@ def _view(gravity: Floats, points: Floats) -> tuple[Floats, Floats]:
     return right, across if np.ptp(points @ up) < _LYING * np.ptp(points @ across) else up
 
 
-def _round_up(value: float) -> float:
-    """Return the next 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(max(value, 1e-9)))
-    return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= value * (1 - 1e-12)))
-
-
-def _text(x: float, y: float, words: str, anchor: str) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="12" fill="#555" text-anchor="{anchor}">{escape(words)}</text>'
-
-
-def _svg(width: int, height: int, parts: list[str]) -> str:
-    return f'<svg viewBox="0 0 {width} {height}" role="img">{"".join(parts)}</svg>'
+def _drawing(parts: list[str]) -> str:
+    return f'<svg viewBox="0 0 420 240" role="img" font-size="12" fill="#555">{"".join(parts)}</svg>'

@@ -7,9 +7,11 @@ from html import escape
 
 import numpy as np
 
+from app import svg
+
 WIDTH, HEIGHT = 300, 190
 LEFT, RIGHT, TOP, BOTTOM = 44, 14, 8, 34
-BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"  # Okabe-Ito
+_POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +68,7 @@ class Axis:
             return str(k)
         if -2 <= k <= 3:
             return f"{10.0**k:g}"
-        return f'10<tspan dy="-4" font-size="8">{k}</tspan>'
+        return f"10{str(k).translate(_POWERS)}"
 
 
 def plot(x_label: str, y_label: str, series: Sequence[Series], *, log_x: bool, mark: str) -> str:
@@ -101,8 +103,7 @@ def plot(x_label: str, y_label: str, series: Sequence[Series], *, log_x: bool, m
 
 def _at(x: Axis, y: Axis, point: tuple[float, float]) -> tuple[float, float]:
     across = LEFT + x.place(point[0]) * (WIDTH - LEFT - RIGHT)
-    down = HEIGHT - BOTTOM - y.place(point[1]) * (HEIGHT - TOP - BOTTOM)
-    return round(across, 1), round(down, 1)
+    return across, HEIGHT - BOTTOM - y.place(point[1]) * (HEIGHT - TOP - BOTTOM)
 
 
 def _frame(x: Axis, y: Axis) -> list[str]:
@@ -110,25 +111,22 @@ def _frame(x: Axis, y: Axis) -> list[str]:
     parts = []
     for place, text in x.ticks():
         across = LEFT + place * (right - LEFT)
-        parts.append(f'<path d="M{across:.1f} {TOP}V{bottom}" stroke="currentColor" stroke-opacity="0.13"/>')
-        parts.append(f'<text x="{across:.1f}" y="{bottom + 13}" text-anchor="middle" opacity="0.75">{text}</text>')
+        parts += [_rule((across, TOP), (across, bottom)), svg.text(across, bottom + 13, text, opacity=0.75)]
     for place, text in y.ticks():
         down = bottom - place * (bottom - TOP)
-        parts.append(f'<path d="M{LEFT} {down:.1f}H{right}" stroke="currentColor" stroke-opacity="0.13"/>')
-        parts.append(f'<text x="{LEFT - 5}" y="{down + 3:.1f}" text-anchor="end" opacity="0.75">{text}</text>')
-    middle = 0.5 * (TOP + bottom)
-    parts.append(f'<text x="{0.5 * (LEFT + right)}" y="{HEIGHT - 5}" text-anchor="middle">{escape(x.label)}</text>')
-    parts.append(f'<text transform="translate(10 {middle}) rotate(-90)" text-anchor="middle">{escape(y.label)}</text>')
+        parts += [_rule((LEFT, down), (right, down)), svg.text(LEFT - 5, down + 3, text, "end", opacity=0.75)]
+    parts.append(svg.text(0.5 * (LEFT + right), HEIGHT - 5, x.label))
+    parts.append(svg.upright(10, 0.5 * (TOP + bottom), y.label))
     return parts
+
+
+def _rule(begin: tuple[float, float], end: tuple[float, float]) -> str:
+    return svg.line([begin, end], "currentColor", 1.0, stroke_opacity=0.13)
 
 
 def _series(one: Series, x: Axis, y: Axis) -> str:
     places = [_at(x, y, point) for point in one.points]
-    text = ""
-    if one.line and len(places) > 1:
-        path = "M" + "L".join(f"{across} {down}" for across, down in places)
-        text = f'<path d="{path}" fill="none" stroke="{one.colour}" stroke-width="1.6"/>'
-    for k, (across, down) in enumerate(places):
-        title = f"<title>{escape(one.titles[k])}</title>" if k < len(one.titles) else ""
-        text += f'<circle cx="{across}" cy="{down}" r="{one.size}" fill="{one.colour}">{title}</circle>'
-    return text
+    titles = one.titles or [""] * len(places)
+    parts = [svg.line(places, one.colour, 1.6)] if one.line and len(places) > 1 else []
+    parts += [svg.dot(place, one.size, one.colour, title) for place, title in zip(places, titles, strict=True)]
+    return "".join(parts)

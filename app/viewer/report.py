@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from app import svg
 from app.viewer import plots
 from app.viewer.client_page import FOLD
 from app.viewer.costs import Costs
@@ -217,9 +218,9 @@ def forces_list(prediction: Prediction) -> str:
 
 def convergence(prediction: Prediction) -> str:
     """Return the plot of update and residual over the iterations (the paper's Fig. 2); only positive values show."""
-    names = (("update [m]", "update", plots.BLUE), ("residual [m]", "residual", plots.ORANGE))
+    names = (("update [m]", "update", svg.BLUE), ("residual [m]", "residual", svg.ORANGE))
     if prediction.accuracy.method == "paper":
-        names = (names[0], ("residual [N]", "residual", plots.ORANGE))
+        names = (names[0], ("residual [N]", "residual", svg.ORANGE))
     series = []
     for name, field, colour in names:
         values = [(float(i.number), float(getattr(i, field))) for i in prediction.iterations]
@@ -242,13 +243,13 @@ def accuracy_plot(prediction: Prediction, earlier: list[tuple[float, float]], me
     front = sorted(places[k] for k in front_of(measured))
     series = [
         plots.Series(name="measured here", points=places, colour=grey, line=False, size=2.0, titles=titles),
-        plots.Series(name="the best of them", points=front, colour=plots.BLUE),
-        plots.Series(name="your solves", points=tuple(earlier), colour=plots.GREEN, line=False),
+        plots.Series(name="the best of them", points=front, colour=svg.BLUE),
+        plots.Series(name="your solves", points=tuple(earlier), colour=svg.GREEN, line=False),
     ]
     accuracy = prediction.accuracy
     if accuracy.error_estimate and accuracy.wall_time > 0:
         here = (1e3 * accuracy.wall_time, 1e3 * accuracy.error_estimate)
-        series.append(plots.Series(name="this solve", points=[here], colour=plots.ORANGE, size=5.0))
+        series.append(plots.Series(name="this solve", points=[here], colour=svg.ORANGE, size=5.0))
         earlier[:] = [*earlier, here][-EARLIER:]
     hint = "" if measured else note("To see what accuracy costs on this machine, run dlo calibrate.", good=True)
     return plots.plot("time [ms]", "error [mm]", series, log_x=True, mark="accuracy") + hint

@@ -5,7 +5,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from app.viewer import plots
+from app import svg
 from dlocore.identify import Identification, Progress
 
 Floats = NDArray[np.float64]
@@ -58,20 +58,22 @@ def error_card(times: Floats, distances: Floats, time: float) -> str:
 
     def place(at: float, value: float) -> tuple[float, float]:
         across = left + (WIDTH - left - 6.0) * (at - t[0]) / max(t[-1] - t[0], 1e-9)
-        return round(across, 1), round(bottom - (bottom - top) * value / most, 1)
+        return across, bottom - (bottom - top) * value / most
 
-    line = "M" + "L".join("{} {}".format(*place(at, float(np.interp(at, t, mm)))) for at in drawn)
-    x, y = place(float(np.clip(time, t[0], t[-1])), now)
+    here = place(float(np.clip(time, t[0], t[-1])), now)
+    parts = [
+        *(svg.line([(left, at), (WIDTH - 6, at)], "currentColor", 1.0, stroke_opacity=0.2) for at in (top, bottom)),
+        svg.text(left - 4, top + 4, f"{most:.0f}", "end"),
+        svg.text(left - 4, bottom + 2, "0", "end"),
+        svg.line([place(at, float(np.interp(at, t, mm))) for at in drawn], svg.BLUE, 1.4),
+        svg.line([(here[0], top), (here[0], bottom)], svg.ORANGE, 1.0),
+        svg.dot(here, 3.5, svg.ORANGE),
+    ]
     return (
         f'<div style="margin: 0 0.75rem 0.5rem; font-size: 0.78rem;" data-error="{now:.2f}"><b>{now:.1f} mm</b> '
         f'from the measured markers <span style="opacity: 0.7;">(median of the markers; over time: median '
         f"{np.median(mm):.1f}, at most {most:.0f} mm)</span>"
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="error over time" '
         'style="width: 100%; display: block;" '
-        f'font-size="10" fill="currentColor"><path d="M{left} {top}H{WIDTH - 6}M{left} {bottom}H{WIDTH - 6}" '
-        f'stroke="currentColor" stroke-opacity="0.2"/><text x="{left - 4}" y="{top + 4}" text-anchor="end">{most:.0f}'
-        f'</text><text x="{left - 4}" y="{bottom + 2}" text-anchor="end">0</text>'
-        f'<path d="{line}" fill="none" stroke="{plots.BLUE}" stroke-width="1.4"/>'
-        f'<path d="M{x} {top}V{bottom}" stroke="{plots.ORANGE}"/><circle cx="{x}" cy="{y}" r="3.5" '
-        f'fill="{plots.ORANGE}"/></svg></div>'
+        f'font-size="10" fill="currentColor">{"".join(parts)}</svg></div>'
     )

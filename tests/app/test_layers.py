@@ -15,7 +15,7 @@ LAYERS = {
         "study", "recordings", "identify",
     ],
     "app": [
-        "settings", "logs", "solids", "instants", "schemas", "archive", "pages", "http", "recording", "reports",
+        "settings", "logs", "solids", "svg", "instants", "schemas", "archive", "pages", "http", "recording", "reports",
         "store", "service", "routes", "viewer", "main", "commands", "cli",
     ],
 }  # fmt: skip
