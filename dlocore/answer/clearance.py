@@ -12,17 +12,21 @@ from dlocore.spline import DEGREE, SplineSurface
 Floats = NDArray[np.float64]
 
 _PARTS = 4  # into which a cell is cut, along the cable or in time, in the direction of larger doubt
-_MOST = 256  # cells cut at once: if a cable lies on an obstacle for long, many are equally near
-_ROUNDS = 30  # most rounds of cuts: rounding is reached before
+_MOST = 256  # cells cut in a round: if a cable lies on an obstacle for long, many are equally near
+_ROUNDS = 30  # most rounds of cuts, a tenth of a second
+_BENDS = (2, 0), (1, 1), (0, 2)  # orders of the derivatives that bound how far a cell deviates from linear
 _STEP = 1e-6  # of half a cell: step for slopes
 
 
 def least_distance(surface: SplineSurface, rows: Floats, tolerance: float) -> float:
-    """Return the least signed distance [m] of a surface's centreline from obstacles, to `tolerance` [m].
+    """Return the least signed distance [m] of a surface's centreline from obstacles.
+
+    It is right to `tolerance` [m] unless the cable bends so fast that the rounds of cuts do not suffice. Then it is the
+    least one that was found, since the cells whose middles are nearest are cut first.
 
     Obstacles are convex, so their distance is nowhere below its tangent plane at the middle of a cell of the surface.
     The control points of the second derivatives bound how far the cell's points deviate from linear. Cells that can't
-    be nearer than the nearest point so far are dropped; the others are cut.
+    be nearer than the nearest point so far are dropped. The others are cut, _MOST of them in a round.
 
     Args:
         surface: the motion.
@@ -37,19 +41,19 @@ def least_distance(surface: SplineSurface, rows: Floats, tolerance: float) -> fl
     if not near.any():
         return least
     k, i = np.nonzero(near)
-    cells = np.column_stack([u[i], t[k], half_u[i], half_t[k]])
-    bends = np.column_stack([_largest(surface, *order)[k, i] for order in ((2, 0), (1, 1), (0, 2))])
+    cells = np.column_stack([u[i], t[k], half_u[i], half_t[k], *[_largest(surface, *order)[k, i] for order in _BENDS]])
+    left = np.empty((0, cells.shape[1] + 3))  # cells with their gap, its lower bound, and the axis to cut along
     for _ in range(_ROUNDS):
         if len(cells) == 0:
             break
-        gaps, doubt = _looked_at(surface, rows, cells, bends)
+        gaps, doubt = _looked_at(surface, rows, cells)
         least = min(least, float(gaps.min()))
         nearest = (gaps - doubt.sum(axis=0)).min(axis=1)
-        left = np.flatnonzero(nearest < least - tolerance)
-        if len(left) > _MOST:
-            left = left[np.argpartition(nearest[left], _MOST)[:_MOST]]
-        in_time = doubt[1, left].max(axis=1) > doubt[0, left].max(axis=1)
-        cells, bends = _cut(cells[left], in_time.astype(int)), np.repeat(bends[left], _PARTS, axis=0)
+        in_time = doubt[1].max(axis=1) > doubt[0].max(axis=1)
+        left = np.concatenate([left, np.column_stack([cells, gaps.min(axis=1), nearest, in_time])])
+        left = left[left[:, -2] < least - tolerance]
+        left = left[np.argsort(left[:, -3])]
+        cells, left = _cut(left[:_MOST, :-3], left[:_MOST, -1].astype(int)), left[_MOST:]
     return least
 
 
@@ -75,30 +79,29 @@ def _largest(surface: SplineSurface, du: int, dt: int) -> Floats:
     return bound
 
 
-def _looked_at(surface: SplineSurface, rows: Floats, cells: Floats, bends: Floats) -> tuple[Floats, Floats]:
+def _looked_at(surface: SplineSurface, rows: Floats, cells: Floats) -> tuple[Floats, Floats]:
     """Return the distances of the middles of cells from obstacles, and by how much they may be less in the cells.
 
     Args:
         surface: the motion.
         rows: of the obstacles (m, ROW).
-        cells: their middles u [m], t [s] and half widths (k, 4).
-        bends: bounds of |r_uu|, |r_ut| and |r_tt| in them (k, 3).
+        cells: their middles u [m], t [s] and half widths, and bounds of |r_uu|, |r_ut| and |r_tt| in them (k, 7).
 
     Returns:
         The distances (k, m) [m], and the possible decrease along the cable and in time (2, k, m) [m].
     """
-    u, t, half_u, half_t = cells.T
+    u, t, half_u, half_t, r_uu, r_ut, r_tt = cells.T
     places, times = [u, u + _STEP * half_u, u], [t, t, t + _STEP * half_t]
     found = distances(rows, _points(surface, np.concatenate(places), np.concatenate(times)))
     gaps, beside, after = found.reshape(3, len(cells), -1)
     slopes = np.abs([beside - gaps, after - gaps]) / _STEP
-    across = bends[:, 1] * half_u * half_t
-    bent = 0.5 * np.array([bends[:, 0] * half_u**2 + across, bends[:, 2] * half_t**2 + across])
+    across = r_ut * half_u * half_t
+    bent = 0.5 * np.array([r_uu * half_u**2 + across, r_tt * half_t**2 + across])
     return gaps, slopes + bent[:, :, None]
 
 
 def _cut(cells: Floats, along: NDArray[np.int64]) -> Floats:
-    """Return the cells (k, 4) cut into _PARTS each, in u where `along` (k,) is 0 and in t where it is 1."""
+    """Return the cells (k, 7) cut into _PARTS each, in u where `along` (k,) is 0 and in t where it is 1."""
     out = np.repeat(cells, _PARTS, axis=0)
     k, axis = np.arange(len(out)), np.repeat(along, _PARTS)
     place = (2.0 * np.arange(_PARTS) + 1.0) / _PARTS - 1.0  # middles of the parts, relative to half the width

@@ -77,6 +77,20 @@ def test_a_corner_of_a_saddle_is_nearer_than_its_slopes_at_the_middle_tell() -> 
     assert least_distance(surface, rows, 1e-5) == pytest.approx(-0.01, abs=1e-5)
 
 
+def test_a_dip_is_found_beside_many_cells_that_bend_more() -> None:
+    """The cable lies 10 mm above a floor. It trembles sideways at first, and dips a little later."""
+    knots_u, knots_t = uniform_knots(13, 1.0), uniform_knots(25, 2.0)
+    control = np.zeros((25, 13, 4))
+    control[..., 0], control[..., 2] = greville(knots_u), 0.01
+    control[:12, :, 1] = 0.003 * np.random.default_rng(0).normal(size=(12, 13))
+    control[18, 6, 2] = 0.008
+    floor = Box(center=(0.5, 0.0, -0.5), size=(3.0, 3.0, 1.0)).row()[None]
+    dip = 0.002 * (2.0 / 3.0) ** 2  # of a control point at its knots
+    for tremble in (1.0, 10.0, 100.0):  # in the end the rounds do not suffice to exclude all others
+        trembling = SplineSurface(control * [1.0, tremble, 1.0, 1.0], knots_u, knots_t)
+        assert least_distance(trembling, floor, 5e-5) == pytest.approx(0.01 - dip, abs=5e-5)
+
+
 def test_the_gap_of_a_cable_that_passes_a_small_ball_early_in_a_long_motion_is_found() -> None:
     ball = Sphere(center=(0.25, 0.254, 0.0085), radius=0.006)
     prediction = predict(
