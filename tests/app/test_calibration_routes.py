@@ -128,7 +128,7 @@ def test_predictions_are_answered_while_it_is_measured(fresh: TestClient) -> Non
     assert fresh.delete(ADDRESS).status_code in (200, 202)
 
 
-def test_the_stored_one_is_there_after_a_restart(fresh: TestClient, tmp_path: Path) -> None:
+def test_the_stored_one_is_there_after_a_restart(fresh: TestClient) -> None:
     data = fresh.app.state.service.settings.data_dir  # type: ignore[attr-defined]
     with TestClient(create_app(Settings(data_dir=data))) as client:
         assert client.get(ADDRESS).json()["points"]

@@ -163,7 +163,7 @@ def test_a_prediction_can_be_asked_for_as_npz(client: TestClient, answer: dict[s
     np.testing.assert_allclose(arrays(response.content)["positions"], answer["surface"]["positions"], **SAME)
 
 
-def test_the_answer_is_that_of_the_contract(client: TestClient, answer: dict[str, Any]) -> None:
+def test_the_answer_is_that_of_the_contract(answer: dict[str, Any]) -> None:
     PredictionResponse.model_validate(answer, strict=True)
     surface = answer["surface"]
     assert np.shape(surface["positions"]) == (33, 101, 3)

@@ -62,6 +62,7 @@ def test_a_difference_is_seen() -> None:
 
 
 def test_the_service_answers_a_random_scene_as_python_does(client: TestClient) -> None:
+    solved = 0
     for scene in drawn(24):
         scene = replace(scene, quality=Quality(n_u=17, n_t=33, keep_grid=True))
         response = client.post("/v1/predictions?store=false", json={**from_scene(scene), "output": {"samples_u": 2}})
@@ -76,6 +77,8 @@ def test_the_service_answers_a_random_scene_as_python_does(client: TestClient) -
         answer = response.json()
         assert answer["status"] == expected.status
         np.testing.assert_array_equal(answer["control_points"], expected.surface.control_points)
+        solved += 1
+    assert solved > 12
 
 
 def test_what_a_motion_goes_on_with_comes_back() -> None:

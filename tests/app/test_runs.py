@@ -274,7 +274,7 @@ def test_an_unfinished_run_is_never_listed(
     assert listed(store(tmp_path)) == ids
 
 
-def test_a_removed_run_is_gone(client: TestClient, tmp_path: Path) -> None:
+def test_a_removed_run_is_gone(client: TestClient) -> None:
     document = client.post("/v1/predictions", json=paper_scene()).json()
     assert client.delete(document["links"]["self"]).status_code == 204
     for link in ("self", "recording", "surface", "scene", "viewer"):

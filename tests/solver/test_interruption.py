@@ -22,6 +22,12 @@ METHODS = {
     "spacetime": Quality(n_u=9, n_t=13, method="spacetime", keep_grid=True),
     "paper": Quality(n_u=9, n_t=13, method="paper"),
 }
+SLOW = {  # each takes 30 times the longest deadline or more
+    "march": march(129, 513),
+    "auto": Quality(target_error=1e-6),
+    "spacetime": Quality(n_u=33, n_t=97, method="spacetime", keep_grid=True),
+    "paper": Quality(n_u=13, n_t=19, method="paper"),
+}
 every_method = pytest.mark.parametrize("method", METHODS)
 
 
@@ -51,14 +57,10 @@ def test_a_running_solve_is_cancelled_within_an_iteration():
 @every_method
 @pytest.mark.parametrize("deadline", [0.0, 1e-3, 5e-3])
 def test_a_deadline_gives_a_finite_surface_and_says_so(method, deadline):
-    n_t = 13 if method == "paper" else 97
-    quality = METHODS[method] if method == "auto" else replace(METHODS[method], n_u=33 if n_t == 97 else 9, n_t=n_t)
-    prediction = predict(paper_scene(0.25, 1e-4, quality=quality), deadline=deadline)
-    assert prediction.status in (("time_limit",) if deadline == 0.0 else ("time_limit", "stalled", "converged"))
+    prediction = predict(paper_scene(0.25, 1e-4, quality=SLOW[method]), deadline=deadline)
+    assert prediction.status == "time_limit", prediction.message
     assert np.isfinite(prediction.surface.control_points).all()
-    assert prediction.message
-    if prediction.status == "time_limit":
-        assert "time" in prediction.message
+    assert prediction.message.startswith("The time limit passed")
 
 
 @pytest.mark.parametrize("deadline", [0.005, 0.01, 0.02, 0.03])
