@@ -132,10 +132,10 @@ def test_an_error_above_the_target_is_none_of_an_answer():
 DIFFERENT: dict[str, tuple[Any, str]] = {
     "accuracy": (lambda s: replace(s, quality=march(11, 13)), "accuracy or grid"),
     "length": (lambda s: replace(s, cable=cable(length=1.1)), "length"),
-    "times": (longer, "other times"),
+    "times": (longer, "different times"),
     "effects": (lambda s: replace(s, environment=replace(s.environment, drag=0.0)), "effects"),
     "out of the plane": (lambda s: moved(s, 0.0, 0.0, 0.05), "dimensions"),
-    "far away": (lambda s: moved(s, 0.0, 0.1, 0.0), "mm from the one"),
+    "far away": (lambda s: moved(s, 0.0, 0.1, 0.0), "mm away from the one"),
     "no march": (lambda s: replace(s, quality=Quality(method="reference", target_error=0.05)), "accuracy or grid"),
 }
 

@@ -155,7 +155,7 @@ def test_a_deadline_leaves_the_given_grid(own: Prediction):
     assert found.status == "converged"
     np.testing.assert_array_equal(found.surface.control_points, own.surface.control_points)
     assert found.accuracy.error_estimate == own.accuracy.error_estimate
-    assert "and do not converge: The time limit passed" in found.message
+    assert "but do not converge: The time limit passed" in found.message
 
 
 def test_finer_grids_that_run_out_of_time_are_the_answer_where_they_are_far_nearer():
