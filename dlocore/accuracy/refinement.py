@@ -86,6 +86,7 @@ class _Climb:
         number: how many grids have refined space and time together, including this one.
         direction: in which the current grid is meant to be finer than the best one: "both", "space" or "time".
         best: the finest march so far that is credible.
+        shown: the best march on grids whose start came to rest, if it does not on finer ones.
         changes: how far refinements moved the surface.
         estimate: error of the best march [m].
         rho: spectral radius of the next march.
@@ -103,6 +104,7 @@ class _Climb:
     number: int
     direction: str = "both"
     best: Level | None = None
+    shown: Level | None = None
     changes: Changes = field(default_factory=Changes)
     estimate: float = np.inf
     rho: float = RHO
@@ -124,81 +126,96 @@ class _Climb:
 
     def outcome(self) -> Outcome:
         """March until an answer is found, and return it."""
-        size: Size | None = stretched(self.problem, self.number)
-        shown: Level | None = None  # the best march on grids whose start came to rest, if it does not on finer ones
-        while size is not None:
-            began, marches = self.monitor.elapsed(), len(self.monitor.iterations)
-            try:
-                level = self._march(size)
-            except TimeIsUp as up:
-                self.monitor.phase("march")
-                self.wanting = ", ".join("a side to go to" if name == "side" else name for name in up.args)
-                break
-            except SceneError as error:
-                if error.field != RESTLESS:
-                    raise
-                self.number += 1
-                shown = self.best or shown
-                if self.number >= len(LEVELS) or (shown is not None and self.means.used_up):
-                    if shown is None:
-                        raise
-                    return self._restless(shown, error)
-                # a start that finds no rest on few control points may do so on more; one that did on
-                # still fewer was at rest only because they can't bend the way it would go
-                self._forget()
-                size = stretched(self.problem, self.number)
-                continue
-            others = self.monitor.iterations[marches:]  # marches of this grid that called for another effect
-            spent = self.monitor.elapsed() - (others[-1].wall_time if others else began)
-            self.means.took(self.problem, size, spent)
-            if self.best is not None:
-                more = self._after_failure(level, self.best, size)
-                if more is not None:
-                    record_level(level, self.monitor)
-                    size = more
-                    continue
-                if level.motion.stopped and not self.best.motion.stopped:
-                    return self._unfinished(level, self.best)
-                self._weigh(level, self.best)
-            record_level(level, self.monitor)
-            self.best, self.failures = level, self.failures + 1 if level.motion.stopped else 0
-            status, message = march_status(level)
-            if level.motion.stopped == "time" or self.failures > len(LEVELS):
-                return Outcome(level, status, message, None)
-            self.torn = self.torn + 1 if level.motion.largest_strain > _TEARS else 0
-            if self.torn == _TORN:
-                return Outcome(level, status, message, self.changes.parts(level))
-            agrees = self.estimate <= ACCEPT * self.target and not self._timed
-            uneven = agrees and is_uneven(level) and self.evened < _EVENED
-            self.evened += uneven
-            unfolds = self._affordable(_finer(size, "space", False)) if uneven or is_folded(level) else None
-            finer: Size | None
-            if agrees and unfolds is None:
-                finer = self._once_more(size)
-                if finer is None and status != "converged":
-                    return Outcome(level, status, message, self.changes.parts(level))
-                if finer is None:
-                    before = self._undermined
-                    self._look(level)
-                    # on a coarse grid disturbances may grow that do not on a fine one
-                    finer = self._next(level, size, None) if self._undermined and not before else None
-                    if finer is None:
-                        return self._agreeing(level)
-            else:
-                unfolded = self._unfolded(level, size)
-                if unfolded is not None:
-                    return unfolded
-                self._look_back(level, size)
-                finer = self._next(level, size, unfolds)
-                if finer is None and status == "converged" and self.estimate <= self.enough:
-                    self._look(level)
-                    # the grid has to make up for the uncertainty of contact
-                    finer = self._next(level, size, unfolds) if self.doubts.contact and not self.doubts.start else None
-            checked = bool(np.isfinite(level.change))
-            if finer is not None and not self.means.next_fits(self.problem, size, finer, spent, checked):
-                return self._within_budget(level)
-            size = finer
-        return self._ended()
+        found: Size | Outcome | None = stretched(self.problem, self.number)
+        while isinstance(found, Size):
+            found = self._after(found)
+        return self._ended() if found is None else found
+
+    def _after(self, size: Size) -> Size | Outcome | None:
+        """March on a grid; return the size of the next one or the answer, None if no finer one is left or in time."""
+        began, marches = self.monitor.elapsed(), len(self.monitor.iterations)
+        try:
+            level = self._march(size)
+        except TimeIsUp as up:
+            self.monitor.phase("march")
+            self.wanting = ", ".join("a side to go to" if name == "side" else name for name in up.args)
+            return None
+        except SceneError as error:
+            if error.field != RESTLESS:
+                raise
+            return self._without_rest(error)
+        others = self.monitor.iterations[marches:]  # marches of this grid that called for another effect
+        spent = self.monitor.elapsed() - (others[-1].wall_time if others else began)
+        self.means.took(self.problem, size, spent)
+        if self.best is not None:
+            more = self._after_failure(level, self.best, size)
+            if more is not None:
+                record_level(level, self.monitor)
+                return more
+            if level.motion.stopped and not self.best.motion.stopped:
+                return self._unfinished(level, self.best)
+            self._weigh(level, self.best)
+        record_level(level, self.monitor)
+        self.best, self.failures = level, self.failures + 1 if level.motion.stopped else 0
+        found = self._decided(level, size)
+        checked = bool(np.isfinite(level.change))
+        if isinstance(found, Size) and not self.means.next_fits(self.problem, size, found, spent, checked):
+            return self._within_budget(level)
+        return found
+
+    def _without_rest(self, error: SceneError) -> Size | Outcome:
+        """Return the size of the next grid if a start found no rest, or the answer if none is left.
+
+        A start that finds no rest on few control points may do so on more. One that did on still fewer was at rest only
+        because they can't bend the way it would go.
+        """
+        self.number += 1
+        self.shown = self.best or self.shown
+        if self.number >= len(LEVELS) or (self.shown is not None and self.means.used_up):
+            if self.shown is None:
+                raise error
+            return self._restless(self.shown, error)
+        self._forget()
+        return stretched(self.problem, self.number)
+
+    def _decided(self, level: Level, size: Size) -> Size | Outcome | None:
+        """Return the size of the grid after a level, or the answer, None if no finer grid is left."""
+        status, message = march_status(level)
+        if level.motion.stopped == "time" or self.failures > len(LEVELS):
+            return Outcome(level, status, message, None)
+        self.torn = self.torn + 1 if level.motion.largest_strain > _TEARS else 0
+        if self.torn == _TORN:
+            return Outcome(level, status, message, self.changes.parts(level))
+        agrees = self.estimate <= ACCEPT * self.target and not self._timed
+        uneven = agrees and is_uneven(level) and self.evened < _EVENED
+        self.evened += uneven
+        unfolds = self._affordable(_finer(size, "space", False)) if uneven or is_folded(level) else None
+        if agrees and unfolds is None:
+            return self._confirmed(level, size, status, message)
+        return self._unfolded(level, size) or self._refined_further(level, size, unfolds, status == "converged")
+
+    def _confirmed(self, level: Level, size: Size, status: Status, message: str) -> Size | Outcome:
+        """Return the answer of a level that agrees with the one before, or the size of a grid that may refute it."""
+        finer = self._once_more(size)
+        if finer is not None:
+            return finer
+        if status != "converged":
+            return Outcome(level, status, message, self.changes.parts(level))
+        before = self._undermined
+        self._look(level)
+        # on a coarse grid disturbances may grow that do not on a fine one
+        finer = self._next(level, size, None) if self._undermined and not before else None
+        return self._agreeing(level) if finer is None else finer
+
+    def _refined_further(self, level: Level, size: Size, unfolds: Size | None, converged: bool) -> Size | None:
+        """Return the size of the grid after a level that does not agree with the one before; None if none is left."""
+        self._look_back(level, size)
+        finer = self._next(level, size, unfolds)
+        if finer is None and converged and self.estimate <= self.enough:
+            self._look(level)
+            # the grid has to make up for the uncertainty of contact
+            finer = self._next(level, size, unfolds) if self.doubts.contact and not self.doubts.start else None
+        return finer
 
     def _march(self, size: Size) -> Level:
         """March on the next grid; if its motion calls for another effect, forget the previous grids."""

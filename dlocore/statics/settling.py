@@ -100,7 +100,8 @@ def settle(
     close_grasps(problem, grid, grasps, starts, q)
     held = hold(problem, grid, grasps, np.full(2, at), starts, q if at > 0.0 else grid.start)
     applied = applied_at_rest(problem, grid, at)
-    rest = _relaxed(problem, grid, q, history, held, applied, ROUNDS, 1.0 if begin is None else _NEARBY, monitor)
+    share = 1.0 if begin is None else _NEARBY
+    rest = _Relaxation(problem, grid, q, history, held, applied, share).rest(ROUNDS, monitor)
     return Settled(problem, q, rest, held, history._replace(tension=grid.history.tension), at, starts)
 
 
@@ -163,89 +164,126 @@ def _with_tension(grid: Grid, history: History) -> History:
     return history._replace(tension=np.zeros((len(grid.tables.axial.w), COLUMNS)))
 
 
-def _relaxed(
-    problem: Problem, grid: Grid, q: Floats, history: History, held: Held, applied: Floats, rounds: int, share: float,
-    monitor: Monitor,
-) -> Rest:  # fmt: skip
-    """Relax the control points q (n_u, nc) and their history in place, in up to `rounds` rounds; return how they rest.
+class _Relaxation:
+    """Relaxations of a cable, one after another, with the springs that the next one begins with.
 
-    `share` is the share of the first springs to begin with.
+    Args:
+        problem, grid: the equations.
+        q, history: control points (n_u, nc) [m] and their history, which are changed in place.
+        held: which of them are held.
+        applied: forces on them (n_u, nc) [N].
+        share: share of the first springs to begin with.
     """
-    active, parameters = problem.law_table()
-    axes, tables, elimination, offset = problem.axes, grid.tables, held.elimination, held.offsets[-1]
-    length = problem.scene.cable.length
-    springs = _SPRINGS * problem.stiffness_aside() + 1e-9
-    strength = searched = share * springs
-    plain, near, weak, moved = problem.contact is None, False, False, 0.0
-    untouched = history._replace(tension=grid.history.tension)
-    while rounds > 0:
-        try:
-            monitor.check()
-        except TimeIsUp:
-            return "time"
-        before = q.copy()
-        if plain:
-            weak = weak or strength <= _WEAK * springs
-            update, used = descend(
-                axes, q, strength, applied, tables, active, parameters, history, elimination, offset,
-                0.0 if weak else _CLOSE, TOLERANCE * length, RESTING * length,
-            )  # fmt: skip
-            if not np.isfinite(update):
-                if near:  # and no weaker springs hold it: at rest, unless it is pushed
-                    return "settled"
-                strength *= _STRONGER
-                if share < 1.0 and strength > springs:
-                    return "restless"
-                plain = strength <= _STRONGEST * springs
-                continue
-            scale = max(1.0, strength / springs)
-            strength *= 0.04 if used <= 2 else 0.2 if used <= 4 else 0.5
-        else:
-            tolerance = TOLERANCE if searched < springs else _ROUGH
-            update, used = relax(
-                axes, q, before, searched, applied, tables, active, parameters, untouched, elimination, offset,
-                tolerance * length, _ITERATIONS,
-            )  # fmt: skip
-            if passes(problem.nc, before, q, tables.contact, parameters, history.pressing):
-                q[:] = before
-                searched *= _STRONGER
+
+    def __init__(
+        self, problem: Problem, grid: Grid, q: Floats, history: History, held: Held, applied: Floats, share: float = 1.0
+    ) -> None:
+        self.problem, self.grid, self.held, self.applied = problem, grid, held, applied
+        self.q, self.history = q, history
+        self.laws, self.length = problem.law_table(), problem.scene.cable.length
+        self.untouched = history._replace(tension=grid.history.tension)
+        self.from_nearby = share < 1.0
+        self.springs = _SPRINGS * problem.stiffness_aside() + 1e-9  # the first ones
+        self.strength = self.searched = share * self.springs  # of Newton's method alone, and with a line search
+        self.plain = problem.contact is None  # whether Newton's method alone is used next
+        self.weak = self.near = False  # whether its springs hold back nothing, and the last one moved the cable no more
+        self.moved = 0.0  # by the last one [m]
+
+    def rest(self, rounds: int, monitor: Monitor) -> Rest:
+        """Relax in up to `rounds` rounds; return how the control points rest."""
+        while rounds > 0:
+            try:
+                monitor.check()
+            except TimeIsUp:
+                return "time"
+            before, plain = self.q.copy(), self.plain
+            found = self._descended() if plain else self._searched(before)
+            rest = None
+            if found is not None:
+                rest = self._rests(before, *found)
+                self.plain = self.problem.contact is None
+            elif plain:
+                rest = self._strengthened()
+            if rest is not None:
+                return rest
+            if found is not None or not plain:  # a failure of Newton's method alone is no round
                 rounds -= 1
-                continue
-            found = update <= max(tolerance, RESTING) * length
-            searched *= 0.2 if used <= 12 else 0.5 if found else 1.0
-            scale, strength = 1.0, springs
-            history.tension[:] = 0.0
-        rounds -= 1
+        return "restless"
+
+    def _descended(self) -> tuple[float, float] | None:
+        """Relax by Newton's method alone; return its last update [m] and a factor on the way, None if it failed."""
+        self.weak = self.weak or self.strength <= _WEAK * self.springs
+        update, used = descend(
+            self.problem.axes, self.q, self.strength, self.applied, self.grid.tables, *self.laws, self.history,
+            self.held.elimination, self.held.offsets[-1], 0.0 if self.weak else _CLOSE, TOLERANCE * self.length,
+            RESTING * self.length,
+        )  # fmt: skip
+        if not np.isfinite(update):
+            return None
+        scale = max(1.0, self.strength / self.springs)
+        self.strength *= 0.04 if used <= 2 else 0.2 if used <= 4 else 0.5
+        return update, scale
+
+    def _strengthened(self) -> Rest | None:
+        """Make the springs stronger, as Newton's method alone failed; return how the cable rests if that ends it."""
+        if self.near:  # and no weaker springs hold it: at rest, unless it is pushed
+            return "settled"
+        self.strength *= _STRONGER
+        if self.from_nearby and self.strength > self.springs:
+            return "restless"
+        self.plain = self.strength <= _STRONGEST * self.springs
+        return None
+
+    def _searched(self, before: Floats) -> tuple[float, float] | None:
+        """Relax with a line search, as `_descended` does; None, and nothing moves, if it went through an obstacle."""
+        tolerance = TOLERANCE if self.searched < self.springs else _ROUGH
+        tables, (active, parameters) = self.grid.tables, self.laws
+        update, used = relax(
+            self.problem.axes, self.q, before, self.searched, self.applied, tables, active, parameters, self.untouched,
+            self.held.elimination, self.held.offsets[-1], tolerance * self.length, _ITERATIONS,
+        )  # fmt: skip
+        if passes(self.problem.nc, before, self.q, tables.contact, parameters, self.history.pressing):
+            self.q[:] = before
+            self.searched *= _STRONGER
+            return None
+        found = update <= max(tolerance, RESTING) * self.length
+        self.searched *= 0.2 if used <= 12 else 0.5 if found else 1.0
+        self.strength = self.springs
+        self.history.tension[:] = 0.0
+        return update, 1.0
+
+    def _rests(self, before: Floats, update: float, scale: float) -> Rest | None:
+        """Return "settled" if a relaxation from `before` (n_u, nc) ended at rest, else None."""
+        problem, history = self.problem, self.history
         if problem.twist is not None:
-            remember_start(axes, q, tables, active, parameters, history)
-        last, moved = moved, float(np.abs(q - before).max())
-        near = scale * moved <= RESTING * length
-        if near and update <= RESTING * length:  # rounding may keep a stiff cable from TOLERANCE
+            remember_start(problem.axes, self.q, self.grid.tables, *self.laws, history)
+        last, self.moved = self.moved, float(np.abs(self.q - before).max())
+        self.near = scale * self.moved <= RESTING * self.length
+        if self.near and update <= RESTING * self.length:  # rounding may keep a stiff cable from TOLERANCE
             return "settled"
-        stays = moved > _COMES_TO_REST * last  # a turn that dies out ends where nothing drives it
-        if not near and stays and (weak or not plain) and _only_turns(problem, grid, history, before, q, applied):
-            return "settled"
-        plain = problem.contact is None
-    return "restless"
+        stays = self.moved > _COMES_TO_REST * last  # a turn that dies out ends where nothing drives it
+        if self.near or not stays or (self.plain and not self.weak):
+            return None
+        return "settled" if _only_turns(problem, self.grid, history, before, self.q, self.applied) else None
 
 
 def _relaxed_firmly(
     problem: Problem, grid: Grid, q: Floats, history: History, held: Held, applied: Floats, rounds: int,
     monitor: Monitor,
 ) -> tuple[Problem, Rest]:  # fmt: skip
-    """Do what `_relaxed` does, repeated with stiffer contact while the cable sinks in too deep and that helps.
+    """Relax q (n_u, nc) and their history in place, with stiffer contact while they sink in too deep and that helps.
 
     Returns:
         what was solved, and how the control points rest.
     """
-    rest, tried = _relaxed(problem, grid, q, history, held, applied, rounds, 1.0, monitor), problem
+    rest, tried = _Relaxation(problem, grid, q, history, held, applied).rest(rounds, monitor), problem
     for _ in range(STIFFER if problem.contact is not None else 0):
         deepest = depth(problem, grid, q)
         if rest == "time" or deepest <= DEEPEST * problem.scene.cable.diameter:
             break
         tried = stiffer_for(tried, deepest)
         before = q.copy(), *(x.copy() for x in history)
-        again = _relaxed(tried, grid, q, history, held, applied, rounds, 1.0, monitor)
+        again = _Relaxation(tried, grid, q, history, held, applied).rest(rounds, monitor)
         if again != "time" and depth(tried, grid, q) <= _YIELDING * deepest:
             problem, rest = tried, again
             continue
