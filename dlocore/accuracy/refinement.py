@@ -132,7 +132,7 @@ class _Climb:
         return self._ended() if found is None else found
 
     def _after(self, size: Size) -> Size | Outcome | None:
-        """March on a grid; return the size of the next one or the answer, None if no finer one is left or in time."""
+        """March on a grid; return the size of the next one or the answer, None if none is left or the time is up."""
         began, marches = self.monitor.elapsed(), len(self.monitor.iterations)
         try:
             level = self._march(size)
