@@ -14,19 +14,16 @@ SEED = 2
 COUNT = 300
 BATCH = 30
 DEADLINE = 1.0  # [s]: an answer that is cut off, one in eight, has a status too
-# Faults of these scenes at some deadline from a tenth of a second to a minute of processor time, docs/stability.md; a
-# mend takes a scene off its list, and none may come to it.
+# Faults of those that end in time, at deadlines from 0.4 to 20 s (docs/stability.md). A mend takes a scene off its
+# list, and none may come to it.
 KNOWN = {
     # by more than 2 % in a span, at a moment: bends sharper than the spans of a grid whose error is within the target
-    "strained": {
-        20, 53, 59, 67, 75, 91, 100, 123, 126, 133, 148, 165, 186, 196, 201, 205, 206, 215, 221, 227, 281, 296,
-    },
-    "spline off a gripper's path": {26, 42, 113, 123, 156, 205, 221},  # more than 1e-4 L beside releases and waypoints
-    "gained energy": {20, 140, 281},  # 2.3 to 5 % of what is about, at estimated errors of 0.4 to 4 % of the length
+    "strained": {20, 91, 165, 196, 281},
+    "spline off a gripper's path": {26, 42, 113, 221},  # by 1e-4 to 1e-3 L: beside a release, and noisy waypoints
+    "gained energy": {281},  # 3.5 % of what is about, at an estimated error of 0.4 % of the length
     "lost momentum": {285},  # 6 %: a heavily damped hairpin, moved fast, on 19 control points in time
-    "not converged: stalled": {62, 206},  # they fold on every grid
-}  # fmt: skip
-COARSE = {"strained", "spline off a gripper's path"}  # what a given grid may show where there is no time for finer ones
+    "not converged: stalled": {62, 206},  # one folds on every grid, one does not determine its motion
+}
 CUT_OFF = ("time limit passed", "time was up")
 PATIENCE = 15.0  # [s]: for scenes that have to converge
 
@@ -48,12 +45,10 @@ def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first
             assert record["status"] != "converged" or told, (index, record["message"])
         else:
             assert record["status"] != "converged", (index, record["families"])
-        late = any(
-            words in record["message"].lower() for words in CUT_OFF
-        )  # as it may be on any machine: counted apart
+        if record["wall"] > DEADLINE or any(words in record["message"].lower() for words in CUT_OFF):
+            continue  # maybe on the grid that is given, however coarse it is: what it shows depends on the machine
         for fault in record["faults"]:
-            excused = late and (fault in COARSE or fault.startswith("not converged"))
-            assert excused or index in KNOWN.get(fault, ()), (index, fault, record["message"])
+            assert index in KNOWN.get(fault, ()), (index, fault, record["message"])
 
 
 def test_of_the_random_scenes_that_end_in_time_99_of_100_converge():
