@@ -145,7 +145,7 @@ class Waypoints(Checked):
 
     `orientations` (n, 4) are unit quaternions (w, x, y, z). They turn the grasp by their rotation since the first,
     R(t) R(0)^-1 in world axes, the shorter way from each to the next. Along a spline the rotation is as smooth as the
-    positions, and starts at rest or moving as they do.
+    positions, and starts at rest or moving as they do. If the orientations stay the same, the grasp does not turn.
 
     The first position must be within 10 mm of the grasped point of the cable when the grasp closes. The start shape is
     moved to it; a cable in motion is drawn to it within 0.2 s.
