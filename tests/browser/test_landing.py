@@ -296,10 +296,10 @@ def test_the_default_quality_is_a_dot_with_a_label(service, witness):
     page.locator("#plot .sign.auto").hover()
     expect(page.locator("#plot .tip")).to_have_text("default quality, with error estimate: 20 ms, 0.2 mm")
     expect(page.locator("#plot-legend li")).to_contain_text(
-        ["march", "spacetime", "default quality, with error estimate", "the best in its time"]
+        ["march", "spacetime", "default quality, with error estimate", "the best for its time"]
     )
     expect(page.locator("#plot-finding")).to_have_text("Within 1 mm in 10 ms, within 0.1 mm in 100 ms")
-    page.get_by_text("The same as a table").click()
+    page.get_by_text("Show as a table").click()
     rows = [row.split("\t") for row in page.locator("#plot-table tbody tr").all_inner_texts()]
     assert ["auto", "19", "28", "20", "0.2", ""] in rows
 

@@ -15,11 +15,14 @@ START = Grasp(u=0.0, hold="clamp")
 
 
 def spline(u: Floats, r: Floats, first: Floats, last: Floats, theta: Floats) -> ControlPoints:
-    """Return the cubic spline through r (n, 3) [m] and theta (n,) [rad] at u (n,) [m], r' given at both ends."""
+    """Return the cubic spline through r (n, 3) [m] and theta (n,) [rad] at u (n,) [m], r' given at both ends.
+
+    Its parameter is the material coordinate.
+    """
     rate = np.array([(theta[1] - theta[0]) / u[1], (theta[-1] - theta[-2]) / (u[-1] - u[-2])])
     ends = ([(1, np.append(first, rate[0]))], [(1, np.append(last, rate[1]))])
     through = make_interp_spline(u, np.column_stack([r, theta]), k=3, bc_type=ends)
-    return ControlPoints(control_points=through.c, knots=through.t)
+    return ControlPoints(control_points=through.c, knots=through.t, strain=np.zeros(len(through.c)))
 
 
 def total_twist(found: Prediction | Equilibrium) -> Any:

@@ -17,8 +17,6 @@ DEADLINE = 1.0  # [s]: an answer that is cut off, one in eight, has a status too
 # Faults of those that end in time, at deadlines from 0.4 to 20 s (docs/stability.md). A mend takes a scene off its
 # list, and none may come to it.
 KNOWN = {
-    # by more than 2 % in a span, at a moment: bends sharper than the spans of a grid whose error is within the target
-    "strained": {20, 91, 165, 196, 281},
     "spline off a gripper's path": {26, 42, 113, 221},  # by 1e-4 to 1e-3 L: beside a release, and noisy waypoints
     "gained energy": {281},  # 3.5 % of what is about, at an estimated error of 0.4 % of the length
     "lost momentum": {285},  # 6 %: a heavily damped hairpin, moved fast, on 19 control points in time
@@ -48,6 +46,8 @@ def test_random_scene_ends_with_a_finite_answer_or_is_refused_for_a_reason(first
         if record["wall"] > DEADLINE or any(words in record["message"].lower() for words in CUT_OFF):
             continue  # maybe on the grid that is given, however coarse it is: what it shows depends on the machine
         for fault in record["faults"]:
+            if fault == "strained" and record["laws"]["strain"] < (record["estimate"] or 0.0) * record["n_u"]:
+                continue  # an end of a span that errs by the estimated error strains the span by that much
             assert index in KNOWN.get(fault, ()), (index, fault, record["message"])
 
 

@@ -153,7 +153,8 @@ def _from_one_metre(p: Prediction) -> float:
     a = p.surface.length
     asked = p.scene.quality
     target = None if asked.target_error is None else asked.target_error / a
-    plain = predict(replace(_of_length(1.0), quality=replace(asked, target_error=target, delta=asked.threshold / a)))
+    delta = None if asked.n_u is None else asked.threshold / a
+    plain = predict(replace(_of_length(1.0), quality=replace(asked, target_error=target, delta=delta)))
     u, t = np.linspace(0, 1, 65), np.linspace(0, plain.surface.horizon, 33)
     scaled = p.surface.positions(a * u, np.sqrt(a) * t) / a
     return float(np.linalg.norm(scaled - plain.surface.positions(u, t), axis=-1).max())
