@@ -25,7 +25,7 @@ def fit_time(knots: Any, times: Any, Q: Any, v0: Any) -> Any:
 def fit_missed(knots: Any, times: Any, Q: Any, C: Any, dimensions: int) -> Any:
     """Return the distance [m] by which the time spline of C (n_t, n, nc) misses each state of Q (k, n, nc) at `times`.
 
-    It is the largest difference of the first `dimensions` coordinates.
+    It is the largest distance of a control point in the first `dimensions` axes.
     """
     first, table = basis_rows(knots, times, 0)
     return _missed(first, table, Q, C, dimensions)
@@ -92,12 +92,14 @@ def _missed(first: Any, table: Any, Q: Any, C: Any, dimensions: int) -> Any:
         g = first[s]
         most, total = 0.0, 0.0
         for i in range(Q.shape[1]):
+            square = 0.0
             for d in range(dimensions):
                 fitted = b0 * C[g, i, d] + b1 * C[g + 1, i, d] + b2 * C[g + 2, i, d] + b3 * C[g + 3, i, d]
-                away = abs(Q[s, i, d] - fitted)
-                most = max(most, away)
-                total += away
-        out[s] = most if total == total else np.inf
+                away = Q[s, i, d] - fitted
+                square += away * away
+            most = max(most, square)
+            total += square
+        out[s] = np.sqrt(most) if total == total else np.inf
     return out
 
 
