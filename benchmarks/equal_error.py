@@ -18,7 +18,7 @@ from dlocore import Prediction, Quality, Scene, predict
 from dlocore.levels.whole_march import sided
 from dlocore.problem.problem import Problem, pose
 from dlocore.reference.motion import simulate
-from dlocore.reference.refine import DEEP, ELEMENTS, FIRMER, STIFFER, STIFFEST
+from dlocore.reference.refine import ELEMENTS, FIRMER, stiffened
 from dlocore.reference.rod import build, nodes_of
 from dlocore.reference.sampling import samples
 from dlocore.solvers.monitor import Monitor
@@ -114,16 +114,13 @@ def _trials(problem: Problem, truth: Truth, error: float, patience: float) -> It
 
 def _simulated(problem: Problem, truth: Truth, elements: int, tolerance: float) -> Trial:
     """Simulate a rod, as firm and as stiff as the reference would have it, and compare it with the truth."""
-    firmness, stiffening = FIRMER ** max(0.0, math.log2(elements / ELEMENTS)), 1.0
+    firmness, stiffening, stiffer = FIRMER ** max(0.0, math.log2(elements / ELEMENTS)), 0.0, 1.0
     nodes = nodes_of(problem, elements, 0)
-    while True:
-        began = clock()
+    while stiffer > stiffening:
+        stiffening, began = stiffer, clock()
         motion = simulate(build(problem, nodes, stiffening, firmness), tolerance, Monitor())
         seconds = clock() - began
-        deep = motion.deepest / problem.scene.cable.diameter
-        if deep <= DEEP or stiffening >= STIFFEST:
-            break
-        stiffening *= float(np.clip(2.0 * deep / DEEP, *STIFFER))
+        stiffer = stiffened(problem, motion, stiffening)
     if motion.stopped:
         return Trial(seconds, math.inf, len(nodes) - 1, motion.steps)
     u = np.linspace(0.0, problem.scene.cable.length, SAMPLES[0])

@@ -66,10 +66,8 @@ def tightens(to: float) -> Premise:
 
 def snaps(prediction: Prediction) -> bool:
     """Return whether the cable is ten times as fast at its fastest moment as it mostly is."""
-    surface = prediction.surface
-    u, t = np.linspace(0.0, surface.length, 65), np.linspace(0.0, surface.horizon, LOOKS)
-    speed = np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1).max(axis=1)
-    return bool(speed.max() > 10.0 * np.median(speed))
+    fastest = _speeds(prediction).max(axis=1)
+    return bool(fastest.max() > 10.0 * np.median(fastest))
 
 
 def yields(prediction: Prediction) -> bool:
@@ -82,12 +80,17 @@ def stays_elastic(prediction: Prediction) -> bool:
     return not yields(prediction)
 
 
-def _slides(prediction: Prediction) -> NDArray[np.bool_]:
-    """Return which points slide at each time (LOOKS, 65)."""
+def _speeds(prediction: Prediction) -> Floats:
+    """Return the speeds of points along the cable at each time (LOOKS, 65) [m/s]."""
     surface = prediction.surface
     u, t = np.linspace(0.0, surface.length, 65), np.linspace(0.0, surface.horizon, LOOKS)
-    speed = np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1)
-    return np.asarray(speed > SLIDING * speed.max())
+    return np.asarray(np.linalg.norm(surface(u, t, dt=1)[..., :3], axis=-1))
+
+
+def _slides(prediction: Prediction) -> NDArray[np.bool_]:
+    """Return which points slide at each time (LOOKS, 65)."""
+    speeds = _speeds(prediction)
+    return np.asarray(speeds > SLIDING * speeds.max())
 
 
 def sticks_and_slips(prediction: Prediction) -> bool:

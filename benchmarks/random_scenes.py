@@ -13,7 +13,6 @@ from the other end, and in other units. Only a table of the distances between th
 import argparse
 import json
 import multiprocessing
-import os
 import signal
 import sys
 import time
@@ -299,7 +298,6 @@ def main() -> None:
     parser.add_argument("--summary", action="store_true", help="only print the summary of the file")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that no process is left behind
-    os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
     staged = options.again > 0
     if options.last_deadline is not None and not staged:
         parser.error("--last-deadline is for those that fail in a second stage: give --again too")

@@ -109,9 +109,9 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
             return Refined(problem, tuple(levels), "time")
         if motion.stopped == "step" and levels:
             return Refined(problem, tuple(levels), "step")
-        deep = motion.deepest / problem.scene.cable.diameter
-        if deep > DEEP and stiffening < STIFFEST:
-            stiffening *= float(np.clip(2.0 * deep / DEEP, *STIFFER))
+        stiffer = stiffened(problem, motion, stiffening)
+        if stiffer > stiffening:
+            stiffening = stiffer
             continue
         met = {} if motion.stopped else _met(problem, samples(motion))
         if met:
@@ -175,6 +175,18 @@ def bend_of(rod: Rod, x: Floats) -> Floats:
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     across = waves - (waves * along).sum(axis=1, keepdims=True) * along
     return np.asarray(DISTURBED * length / np.linalg.norm(across, axis=1).max() * across)
+
+
+def stiffened(problem: Problem, motion: Motion, stiffening: float) -> float:
+    """Return the stiffness of contact with which to repeat a motion, as a multiple of the one that bears the weight.
+
+    It is that of the motion, `stiffening`, if the motion is not too deep in a surface, or if contact is as stiff as it
+    may be.
+    """
+    deep = motion.deepest / problem.scene.cable.diameter
+    if deep > DEEP and stiffening < STIFFEST:
+        return stiffening * float(np.clip(2.0 * deep / DEEP, *STIFFER))
+    return stiffening
 
 
 def _tolerance(target: float, k: int) -> float:
