@@ -34,6 +34,11 @@ class Doubts:
     looked: Level | None = None
     unseen: bool = False
 
+    @property
+    def unsure(self) -> float:
+        """How far the motion may differ by both [m]."""
+        return self.start + self.contact
+
     def look(self, level: Level, monitor: Monitor, hard: bool) -> None:
         """Find what is uncertain about a level; `hard` as in `goes_astray`.
 
@@ -60,22 +65,26 @@ class Doubts:
 
     def undermines(self, estimate: float, enough: float) -> bool:
         """Tell whether a motion whose estimated error [m] would be good enough [m] may still differ by too much."""
-        return self._loses(self.start + self.contact, estimate, enough)
+        return self.lost or (self.unsure > 0.0 and estimate + self.unsure > enough)
+
+    def hopeless(self, enough: float) -> bool:
+        """Tell whether a motion may differ by more than is good enough [m] however fine its grid is."""
+        return self.lost or self.unsure > enough
 
     def status(self, status: Status, advice: str, estimate: float, enough: float) -> tuple[Status, str]:
         """Return the status and advice of an answer, which is not converged if these doubts undermine it."""
-        if self._loses(self.start, estimate, enough) or self.contact > enough:
+        if self.hopeless(enough):
             return "stalled", " Make the motion slower, damp it, or hold the cable in more places."
         return ("max_iterations", f" {ALLOW}") if self.undermines(estimate, enough) else (status, advice)
 
     def told(
-        self, message: str, parts: Mapping[str, float] | None, problem: Problem, estimate: float, enough: float
+        self, message: str, parts: Mapping[str, float] | None, problem: Problem, enough: float
     ) -> tuple[str, dict[str, float] | None]:
         """Return a message and the parts of the error [m], including what is uncertain."""
         parts, said = dict(parts or {}), []
         if self.start:
             parts["start"] = self.start
-            words = in_words if self._loses(self.start, estimate, enough) else bend_in_words
+            words = in_words if self.lost or self.start > enough else bend_in_words
             said.append(words(problem, self.start))
         if self.contact:
             parts["contact"] = self.contact
@@ -83,6 +92,3 @@ class Doubts:
         if said:
             return f"{message} But {', and '.join(said)}.", parts
         return message + (f" {UNSEEN}" if self.unseen else ""), parts or None
-
-    def _loses(self, unsure: float, estimate: float, enough: float) -> bool:
-        return unsure > 0.0 and (self.lost or estimate + unsure > enough)

@@ -204,7 +204,8 @@ class _Climb:
         before = self._undermined
         self._look(level)
         # on a coarse grid disturbances may grow that do not on a fine one
-        finer = self._next(level, size, None) if self._undermined and not before else None
+        helps = self._can_make_up or not before
+        finer = self._next(level, size, None) if self._undermined and helps else None
         return self._agreeing(level) if finer is None else finer
 
     def _refined_further(self, level: Level, size: Size, unfolds: Size | None, converged: bool) -> Size | None:
@@ -213,8 +214,7 @@ class _Climb:
         finer = self._next(level, size, unfolds)
         if finer is None and converged and self.estimate <= self.enough:
             self._look(level)
-            # the grid has to make up for the uncertainty of contact
-            finer = self._next(level, size, unfolds) if self.doubts.contact and not self.doubts.start else None
+            finer = self._next(level, size, unfolds) if self._undermined and self._can_make_up else None
         return finer
 
     def _march(self, size: Size) -> Level:
@@ -343,12 +343,13 @@ class _Climb:
             # on the same steps strongly damped marches err far more; but strands that strike each other rebound less
             self.rho = RHO
         hope = _AT_BEST ** self._left(sizes[self.direction])
-        return None if change is not None and hope * change.moved > self.enough else sizes[self.direction]
+        allowed = self.enough - (self.doubts.unsure if self._can_make_up else 0.0)
+        return None if change is not None and hope * change.moved > allowed else sizes[self.direction]
 
     def _affordable(self, size: Size) -> Size | None:
         """Return a size, or None if its march takes too long."""
         success = self.best is None or not is_folded(self.best)
-        content = self.enough > self.target and self.estimate + self.doubts.contact <= self.enough and success
+        content = self.enough > self.target and self.estimate + self.doubts.unsure <= self.enough and success
         return self.means.affordable(self.problem, size, content)
 
     def _left(self, size: Size | None) -> int:
@@ -372,6 +373,11 @@ class _Climb:
         """Whether start or contact may change the motion so much that no grid can give the requested accuracy."""
         return self.doubts.undermines(self.estimate, self.enough)
 
+    @property
+    def _can_make_up(self) -> bool:
+        """Whether a grid that is fine enough can make up for what start and contact may change."""
+        return not self.doubts.hopeless(self.enough)
+
     def _agreeing(self, level: Level) -> Outcome:
         return self._answer(level, "converged", self._agreed(level))
 
@@ -383,7 +389,7 @@ class _Climb:
 
     def _told(self, level: Level, message: str) -> tuple[str, dict[str, float] | None]:
         """Return a message and the parts of the error [m], with how far start and contact may change the motion."""
-        return self.doubts.told(message, self.changes.parts(level), self.problem, self.estimate, self.enough)
+        return self.doubts.told(message, self.changes.parts(level), self.problem, self.enough)
 
     def _agreed(self, level: Level) -> str:
         return f"Two grids agree to {in_mm(level.change)}; {self._left_over()}."

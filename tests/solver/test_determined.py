@@ -11,6 +11,7 @@ from benchmarks.hard.generator import draw
 from dlocore import Cable, Cancelled, Environment, Grasp, Move, Points, Quality, Scene, Straight, Table, predict
 from dlocore.accuracy import doubts, refinement
 from dlocore.accuracy.budget import Means
+from dlocore.answer.parts import Status
 from dlocore.kernels.growth import fastest_growth
 from dlocore.levels.whole_march import march_level
 from dlocore.problem.events import closed_grasps
@@ -321,6 +322,34 @@ def test_a_grid_that_is_finer_decides_whether_a_motion_is_determined(monkeypatch
     assert seen[1] == (answer.accuracy.n_u, answer.accuracy.steps)
     assert np.prod(seen[1]) > np.prod(seen[0])
     assert "start" not in answer.accuracy.error_parts
+
+
+def test_what_a_bend_leaves_too_little_room_for_is_made_up_for_by_finer_grids():
+    """Two grids agreed to 86 mm of 181, and a bend moves the motion by 121 mm: it was `stalled`."""
+    scene = draw(165, 2942).make()
+    found = predict(scene)
+    target = scene.quality.target_error
+    assert target is not None
+    assert found.status == "converged", found.message
+    assert found.accuracy.error_parts["start"] > 0.5 * target
+    assert found.accuracy.error_estimate <= target
+    assert "does not determine" not in found.message
+
+
+@pytest.mark.parametrize(
+    ("start", "contact", "estimate", "status"),
+    [
+        (0.006, 0.0, 0.003, "converged"),
+        (0.006, 0.0, 0.005, "max_iterations"),  # a finer grid would do
+        (0.012, 0.0, 0.001, "stalled"),
+        (0.006, 0.005, 0.001, "stalled"),  # together they leave no room for any grid
+        (0.003, 0.005, 0.003, "max_iterations"),
+    ],
+)
+def test_only_what_no_grid_can_make_up_for_is_stalled(start: float, contact: float, estimate: float, status: Status):
+    unsure = doubts.Doubts(start=start, contact=contact)
+    assert unsure.status("converged", "", estimate, enough=0.01)[0] == status
+    assert unsure.hopeless(0.01) == (status == "stalled")
 
 
 @pytest.mark.parametrize("marches", [False, True])
