@@ -80,7 +80,7 @@ def identify(
         resolution: how finely recordings are replayed.
         window: [s] of the windows into which longer recordings are cut, 0.001 to 10,000. They are also cut where held
             markers are lost for too long.
-        iterations: at most.
+        iterations: at most; at least one.
         on_progress: called after every iteration.
         cancelled: called between replays; if it returns True the search stops.
 
@@ -100,14 +100,12 @@ def identify(
     whole("n_u", resolution.n_u, at_least=5, at_most=MAX_N_U)
     number("step", resolution.step, at_least=LEAST_STEP, at_most=1.0, unit="s")
     window = number("window", window, at_least=_SHORTEST, at_most=_LONGEST, unit="s")
+    iterations = whole("iterations", iterations, at_least=1)
     windows = cut(recordings, window)
     clamps = max(sum(h.towards is not None for h in r.holds) for r in windows)
     free = sorted({int(i) for r in windows for i in r.free})
     known = cable_of(recordings) if cable is None else _known(cable, recordings)
     given = start or Candidate(cable=known, environment=environment or Environment())
-    if not isinstance(given.cable.rest_shape, str) or given.cable.rest_shape != "straight":
-        allowed = '"straight"; stress-free bends are identified as the parameter "rest_curvature"'
-        raise SceneError("cable.rest_shape", given.cable.rest_shape, allowed)
     given = replace(
         given,
         cable=resized(given.cable, cast(float, recordings[0].length)),

@@ -45,6 +45,10 @@ class Update:
     seconds: float
 
 
+class _NothingShownError(Exception):
+    """The latest frames can't improve an estimate; the message says why."""
+
+
 class Identifier:
     """An estimate of the cable that is updated as frames arrive.
 
@@ -62,6 +66,9 @@ class Identifier:
         window: above 0 to 60 [s]; it has 12 frames at least.
         rate: of the frames, 1 to 10,000 [Hz].
         resolution: how finely the window is replayed.
+
+    Attributes:
+        skipped: why the last `update` returned None; "" if it did not.
 
     Raises:
         SceneError: an argument is out of range or of another type, nothing is held, or a parameter is unknown or needs
@@ -110,6 +117,7 @@ class Identifier:
             raise SceneError("held", self._window.held, "two neighbouring markers, as a clamp", needed)
         self._precision = np.eye(len(self._chosen)) / _FIRST**2
         self._next = 0
+        self.skipped = ""
 
     @property
     def cable(self) -> Cable:
@@ -160,28 +168,52 @@ class Identifier:
         """Improve the estimate by the latest frames; return None while there are too few, or if they show nothing.
 
         They show nothing if a held marker is lost for too long, if a marker is hardly ever seen, if nothing can be
-        replayed, or if the motion is so unstable that it has no derivative.
+        replayed, or if the motion is so unstable that it has no derivative. `skipped` then says which.
+        """
+        self.skipped = ""
+        try:
+            return self._improved(perf_counter())
+        except _NothingShownError as reason:
+            self.skipped = str(reason)
+            return None
+
+    def _replayed(self) -> tuple[Replay, Played]:
+        """Replay the window with the latest estimate.
+
+        Raises:
+            _NothingShownError: it can't be replayed.
         """
         if len(self._times) < self._frames:
-            return None
-        began = perf_counter()
+            raise _NothingShownError(f"{len(self._times)} of the {self._frames} frames of a window have arrived")
         times = np.array(self._times) - self._times[0]
         try:
             recording = replace(self._window, times=times, markers=np.array(self._markers))
-            if gaps(recording):
-                return None
+            for gap in gaps(recording):
+                lost = f"held marker {gap.marker} is lost for {gap.end - gap.begin:.2g} s"
+                raise _NothingShownError(f"{lost}, up to {self._times[0] + gap.end:.4g} s")
             replay = Replay(recording, self._resolution)
             played = replay.play(self._candidate)
-        except SceneError:  # a marker that is hardly seen, or outliers where the window begins: no cable lies like that
-            return None
-        if played.stopped or played.motion.split > 0:  # neighbours of a motion that took smaller steps jump
-            return None
-        free = recording.free
+        except SceneError as error:  # a marker is hardly seen, or outliers begin the window: no cable lies like that
+            raise _NothingShownError(f"the window can't be replayed: {error}") from error
+        if played.stopped:
+            raise _NothingShownError("the replay stops before its end")
+        if played.motion.split > 0:
+            raise _NothingShownError("the replay takes smaller steps, so neighbouring motions jump")
+        return replay, played
+
+    def _improved(self, began: float) -> Update:
+        """Improve the estimate; `began` is when that began, on the clock `perf_counter` [s].
+
+        Raises:
+            _NothingShownError: the latest frames show nothing.
+        """
+        replay, played = self._replayed()
+        recording, free = replay.recording, replay.recording.free
         x = np.array([p.coordinate(p.get(self._candidate)) for p in self._chosen])
         try:
             J = self._derivatives(replay, played, x)[:, free].reshape(-1, len(x))
-        except ValueError:
-            return None
+        except ValueError as error:
+            raise _NothingShownError(f"the motion has no derivative: {error}") from error
         away = (played.predicted - replay.markers)[:, free]
         r = np.where(np.isfinite(away), away, 0.0).ravel()
         J[~np.isfinite(away).ravel()] = 0.0

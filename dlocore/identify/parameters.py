@@ -151,7 +151,14 @@ def parameters(
 
 
 def prepared(candidate: Candidate, names: tuple[str, ...], clamps: int, markers: int = 0) -> Candidate:
-    """Return the candidate with everything that the parameters vary in place, for so many clamps and markers."""
+    """Return the candidate with everything that the parameters vary in place, for so many clamps and markers.
+
+    Raises:
+        SceneError: its cable is not straight when stress-free.
+    """
+    if not isinstance(candidate.cable.rest_shape, str) or candidate.cable.rest_shape != "straight":
+        allowed = '"straight"; stress-free bends are identified as the parameter "rest_curvature"'
+        raise SceneError("cable.rest_shape", candidate.cable.rest_shape, allowed)
     if any(n.startswith("rest_curvature") for n in names) and candidate.rest_curvature is None:
         candidate = replace(candidate, rest_curvature=np.zeros((PLACES, 2)), twist=True)
     if any(n.startswith("clamp_angles") for n in names) and candidate.clamp_angles is None:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -118,6 +118,9 @@ def test_what_can_not_be_replayed_is_named() -> None:
         identify([free])
     with pytest.raises(SceneError, match="parameters"):
         identify([free], names=("colour",))
+    for iterations in (0, 2.5, "25"):
+        with pytest.raises(SceneError, match=r"^iterations: got .* an integer, at least 1"):
+            identify([free], iterations=cast(Any, iterations))
     with pytest.raises(SceneError, match="recordings"):
         identify([])
 

@@ -41,6 +41,7 @@ def test_frames_that_do_not_fit_are_refused() -> None:
     identifier = Identifier(np.linspace(0.0, 1.0, 5), (0,), CABLE)
     identifier.add(0.0, np.zeros((5, 3)))
     assert identifier.update() is None
+    assert identifier.skipped == "1 of the 24 frames of a window have arrived"
     with pytest.raises(SceneError, match="time"):
         identifier.add(0.0, np.zeros((5, 3)))
     with pytest.raises(SceneError, match="markers"):
@@ -82,6 +83,7 @@ def test_a_frame_of_what_is_no_number_is_refused_and_the_next_is_taken(field: st
         ("markers", {"u": [0.0, 1.0]}),
         ("length", {"u": [0.0, 0.5, 1.5]}),
         ("cable", {"cable": None}),
+        ("cable.rest_shape", {"cable": replace(CABLE, rest_shape="initial")}),
         ("environment", {"environment": {}}),
         ("resolution", {"resolution": 9}),
         ("parameters", {"names": "drag"}),
@@ -115,14 +117,25 @@ def test_offsets_of_markers_are_identified_while_frames_arrive() -> None:
     assert abs(update.values["marker_offsets[5][0]"]) < 0.005  # the marker is on the cable
 
 
-def test_a_marker_that_is_hardly_seen_shows_nothing() -> None:
-    recording = simulated(8, 1.0, cable=CABLE, environment=DRAG)
+@pytest.mark.parametrize(
+    ("marker", "begin", "why"),
+    [
+        (5, 0, "the window can't be replayed: markers[:, 5]: got seen in 0% of the frames"),
+        (0, 60, "held marker 0 is lost for 0.21 s, up to 0.495 s"),
+    ],
+)
+def test_a_marker_that_is_hardly_seen_shows_nothing_and_that_is_said(marker: int, begin: int, why: str) -> None:
+    recording = simulated(8, 1.2, cable=CABLE, environment=DRAG)
     identifier = Identifier(recording.u, recording.held, CABLE, DRAG)
     for k in range(0, 100, 3):
         frame = np.array(recording.markers)[k]
-        frame[5] = np.nan
+        frame[marker] = np.nan if k >= begin else frame[marker]
         identifier.add(float(np.asarray(recording.times)[k]), frame)
     assert identifier.update() is None
+    assert identifier.skipped.startswith(why)
+    for k in range(100, 120):
+        identifier.add(float(np.asarray(recording.times)[k]), np.asarray(recording.markers)[k])
+    assert (identifier.update() is None) == bool(identifier.skipped)
 
 
 @pytest.mark.parametrize(
