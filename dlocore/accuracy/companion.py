@@ -84,7 +84,7 @@ def by_finer(problem: Problem, level: Level, monitor: Monitor) -> Compared:
 def _compared(share: float, level: Level, other: Level) -> Compared:
     """Return the estimate as a share of the distance to another march."""
     apart = share * distance(level, other)
-    return Compared(apart, turned=turned(level, other), beside=(other,))
+    return Compared(apart, turned=turned(level, other), beside=(other.lean,))
 
 
 def _resized(problem: Problem, size: Size, points: float, steps: float) -> Size:

@@ -231,7 +231,7 @@ class _Climb:
         )
         if before is not None and level.posed is self.problem:
             change = distance(before, level)
-            beside = (before.alone, *(() if self._refined(level, before) == "both" else before.beside[:1]))
+            beside = (before.lean, *(() if self._refined(level, before) == "both" else before.beside[:1]))
             level = replace(level, change=change, turned=turned(before, level), beside=beside)
             if not self._is_rough(level):  # so strands do not meet just because of the grid
                 level = march_level(self.problem, size, self.monitor, rho, free_knots=True, known=level, whole=True)

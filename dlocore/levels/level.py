@@ -103,6 +103,11 @@ class Level:
         return replace(self, beside=())
 
     @property
+    def lean(self) -> "Level":
+        """The level as its forces are compared with: alone, and without the log of its motion, the most of its data."""
+        return replace(self, beside=(), motion=self.motion.unlogged)
+
+    @property
     def marched(self) -> Problem:
         """The problem as it was marched: the give of friction is adapted to the steps."""
         return firmer(self.problem, self.problem.horizon / self.motion.asked)

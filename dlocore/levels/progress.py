@@ -1,5 +1,6 @@
 """What a solve reports while it runs: its grids and iterates, as surfaces in the world frame."""
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -9,11 +10,15 @@ from dlocore.answer.frames import free_control
 from dlocore.answer.parts import Iteration
 from dlocore.answer.report import elastic_energy, surface_of
 from dlocore.levels.level import Level
+from dlocore.pickling import Known
 from dlocore.solvers.march import STRONGLY_DAMPED
 from dlocore.solvers.monitor import Monitor
 from dlocore.spline import SplineSurface
 
 Floats = NDArray[np.float64]
+
+
+_LARGE = 1.6e7  # bytes of a march's log, which is not kept for the surface of an iterate if it is larger
 
 
 def record_level(level: Level, monitor: Monitor) -> None:
@@ -22,7 +27,7 @@ def record_level(level: Level, monitor: Monitor) -> None:
     note = "march" + (", strongly damped" if motion.rho == STRONGLY_DAMPED else "")
     note += f", {motion.split} steps in smaller ones" if motion.split else ""
     note += f", {level.note}" if level.note else ""
-    record(level, level.control, monitor, update=level.change, residual=motion.update, note=note)
+    record(level, level.control, monitor, update=level.change, residual=motion.update, note=note, kept=False)
 
 
 def record(
@@ -35,8 +40,12 @@ def record(
     note: str,
     damping: float = 0.0,
     step_length: float = 1.0,
+    kept: bool = True,
 ) -> None:
-    """Report an iterate `control` (n_t, n_u, nc) on the grid of a level; the rest is as in `Iteration`."""
+    """Report an iterate `control` (n_t, n_u, nc) on the grid of a level; the rest is as in `Iteration`.
+
+    If the level is not `kept` to the end of the solve, the iterate does not keep it either if it is large.
+    """
     grid = level.motion.grid
     monitor.report(
         Iteration(
@@ -48,11 +57,19 @@ def record(
             step_length=step_length,
             n_u=grid.n_u,
             n_t=len(control),
-            find_surface=partial(surface_at, level, control),
-            find_energy=partial(elastic_energy, level.problem, grid, control[-1], level.motion.history),
+            find_surface=_finder(level, control, kept),
+            find_energy=partial(elastic_energy, level.problem, grid, control[-1].copy(), level.motion.history),
             note=note,
         )
     )
+
+
+def _finder(level: Level, control: Floats, kept: bool) -> Callable[[], SplineSurface]:
+    """Return a function that finds the surface of an iterate when it is asked for; see `record`."""
+    if level.problem.twist is None:
+        return partial(surface_of, level.problem, level.motion.grid.knots, level.knots_t, control)
+    find = partial(surface_at, level, control)
+    return find if kept or level.motion.log.nbytes <= _LARGE else Known(find())
 
 
 def surface_at(level: Level, control: Floats) -> SplineSurface:

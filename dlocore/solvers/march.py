@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, cast
@@ -112,6 +112,11 @@ class March:
 
     def __getstate__(self) -> dict[str, Any]:
         return state_with(self, forces="find_forces")
+
+    @property
+    def unlogged(self) -> "March":
+        """The same motion without its log."""
+        return self if len(self.log) == 0 else replace(self, log=self.log[:0].copy())
 
     @property
     def kinked(self) -> bool:

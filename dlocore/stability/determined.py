@@ -83,12 +83,14 @@ def goes_astray(problem: Problem, motion: March, monitor: Monitor, hard: bool) -
     if plain.stopped:
         return 0.0
     at = np.unique(np.linspace(0, len(plain.states) - 1, _COMPARED).round().astype(int))
+    states = plain.states[at]
+    del plain  # it can take a gigabyte, and so can the next
 
     def moved(way: float) -> float:
         other = marched(way)
         if other.stopped:
             return 0.0
-        apart = (other.states[at] - plain.states[at])[..., : problem.plane.dimensions]
+        apart = (other.states[at] - states)[..., : problem.plane.dimensions]
         return float(np.linalg.norm(apart, axis=-1).max())
 
     return farther(moved, problem.scene.cable.length)

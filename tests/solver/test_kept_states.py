@@ -1,14 +1,18 @@
 """Marches of very many steps, of which not every state is kept: the motion is the same, seen at fewer times."""
 
 import dataclasses
+import gc
+import weakref
 
 import numpy as np
 import pytest
 
 from dlocore import Cable, Environment, Grasp, Load, Move, Points, Quality, Scene, Sphere, Table, predict
+from dlocore.accuracy import refinement
 from dlocore.kernels.predictor import differences_of
-from dlocore.levels import review
-from dlocore.levels.level import Size
+from dlocore.levels import progress, review
+from dlocore.levels.level import Level, Size
+from dlocore.levels.progress import record_level
 from dlocore.levels.whole_march import march_level
 from dlocore.problem.problem import pose
 from dlocore.problem.time_grid import marks_of, step_counts
@@ -203,3 +207,37 @@ def test_obstacles_are_looked_for_in_a_few_states_at_once(gap: float, says: str,
     monkeypatch.setattr(review, "_BLOCK", 7)
     assert review._touches(level) == at_once
     assert says in at_once.get("obstacles", "") if says else at_once == {}
+
+
+@pytest.mark.parametrize("name", ["let go", "twisted and yielding"])
+def test_of_the_grids_before_the_last_no_log_is_kept_and_nothing_that_is_asked_for_changes(
+    name: str, monkeypatch: pytest.MonkeyPatch
+):
+    """Frames and memory of all grids of a long refinement took gigabytes."""
+    marches: list[weakref.ref[March]] = []
+
+    def seen(level: Level, monitor: Monitor) -> None:
+        marches.append(weakref.ref(level.motion))
+        record_level(level, monitor)
+
+    scene = dataclasses.replace(SCENES[name], quality=Quality(target_error=3e-3))
+    monkeypatch.setattr(refinement, "record_level", seen)
+    plain = predict(scene)
+    assert len(plain.iterations) > 1
+    kept_without = [found() for found in marches]
+    marches.clear()
+    monkeypatch.setattr(progress, "_LARGE", 0)
+    found = predict(scene)
+    gc.collect()
+    *before, last = [march() for march in marches]
+    assert last is not None
+    assert found.level is not None
+    assert all(march is None for march in before)
+    assert all(len(level.motion.log) == 0 for level in found.level.beside)
+    assert any(kept_without[:-1])  # small ones are, until their surface is asked for, which takes time
+    for one, other in zip(plain.iterations, found.iterations, strict=True):
+        np.testing.assert_array_equal(one.surface.control_points, other.surface.control_points)
+        assert one.energy == other.energy
+    for grasp, same in zip(plain.grasps, found.grasps, strict=True):
+        np.testing.assert_array_equal(grasp.reaction_error, same.reaction_error)
+        np.testing.assert_array_equal(grasp.moment_error, same.moment_error)
