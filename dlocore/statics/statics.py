@@ -32,6 +32,7 @@ from dlocore.stability.sideways import WITH_TWIST, is_unstable, lacks_twist, sol
 from dlocore.statics.regrid import begin_on, starts_folded
 from dlocore.statics.resting import slide_to_rest
 from dlocore.statics.settling import Settled, depth, holding, settle, settle_along
+from dlocore.statics.sharp_bends import missing_moments
 from dlocore.statics.tipping import tip_notes, tipped
 from dlocore.statics.yielding import yield_notes
 from dlocore.words import in_mm
@@ -154,7 +155,11 @@ def equilibrium(
         notes.append(f"which of several equilibria it comes to is not determined: {bend}")
     world = problem.world(free_of_frames(problem, grid, q[None], history.past[None])[0])
     forces, *before = [np.array(_held(*one)) for one in rest.found[::-1]]
-    errors = _LEFT * np.linalg.norm(forces - before[0], axis=2) if before else (None, None)
+    reaction_errors: Floats | None = None
+    moment_errors: Floats | None = None
+    if before:
+        reaction_errors, moment_errors = _LEFT * np.linalg.norm(forces - before[0], axis=2)
+        moment_errors = np.maximum(moment_errors, missing_moments(problem, grid.knots, world, forces[1]))
     return Equilibrium(
         status=rest.status,
         message=with_notes(rest.message, notes),
@@ -162,8 +167,8 @@ def equilibrium(
         knots_u=grid.knots,
         reactions=forces[0],
         moments=forces[1],
-        reaction_errors=errors[0],
-        moment_errors=errors[1],
+        reaction_errors=reaction_errors,
+        moment_errors=moment_errors,
         energy=elastic_energy(problem, grid, q, history),
         error_estimate=None if n_u is not None or not np.isfinite(rest.change) else rest.change,
     )
