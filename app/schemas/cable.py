@@ -96,8 +96,8 @@ class CableModel(Model):
     rest_shape: RestShape = Field(
         default="straight",
         description=(
-            "The stress-free shape: `straight`, `initial` (the start shape) or points in order along the cable, 2D or "
-            "3D [m]."
+            "The stress-free shape, without twist: `straight`, `initial` (the curve of the start shape) or points in "
+            "order along the cable, 2D or 3D [m]. A start with angles of its sections is twisted against it."
         ),
         examples=["straight"],
     )

@@ -78,8 +78,8 @@ class Cable(Checked):
         memory_rate: the paper's k_eps [1/s], the rate at which strain beyond yield becomes permanent; required with any
             yield strain.
         hardening: share of the remembered strain that acts as a back stress, 0 (the paper's law) to 1.
-        rest_shape: the stress-free shape: "straight", "initial" (the start shape), or points (n, 2 or 3) [m], 4 to
-            100,000 of them.
+        rest_shape: the stress-free shape, without twist: "straight", "initial" (the curve of the start shape), or
+            points (n, 2 or 3) [m], 4 to 100,000 of them. A start with theta is twisted against it.
         point_masses: attached parts, such as a connector at an end.
 
     Raises:
