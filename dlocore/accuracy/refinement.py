@@ -22,7 +22,7 @@ from dlocore.levels.level import (
 )
 from dlocore.levels.progress import record_level
 from dlocore.levels.review import neglected
-from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, march_level, march_status
+from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, is_wound, march_level, march_status
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import AUTO_TARGET, Quality
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED
@@ -36,7 +36,7 @@ ROUGH = 0.05  # of the length: grids that differ more are not in order yet: the 
 _FINER = {"space": 1.5, "time": 2.0}
 _FINE_IN_TIME = 0.3  # of the target: a time spline that misses its march by less keeps its knots as steps halve
 _AT_BEST = 0.2  # of an error is left by one refinement, at best: if that is too much after all of them, none is begun
-_EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before about strain within a span
+_EVENED = 3  # refinements in space, at most, of a grid that agrees with the one before, but hides strain or helices
 _TEARS = 0.5  # axial strain that no finer grid is expected to remove, once ...
 _TORN = 3  # ... this many in a row have it
 _FAILURES = 2  # refinements in time of a march that found no equilibrium
@@ -93,7 +93,8 @@ class _Climb:
         failures: marches in a row that were worse than the best one or found no equilibrium where it did.
         doubts: what is uncertain about the last grid that agreed, since other grids would agree on it too.
         torn: marches in a row that strained the cable by more than `_TEARS`.
-        evened: how often control points were added because the cable was strained between the points that watch it.
+        evened: how often control points were added because the cable was strained between the points that watch it,
+            or twisted enough to wind itself more finely than they show.
         wanting: effects that a finer grid called for but that there was no time to march with, in words.
     """
 
@@ -187,9 +188,9 @@ class _Climb:
         if self.torn == _TORN:
             return Outcome(level, status, message, self.changes.parts(level))
         agrees = self.estimate <= ACCEPT * self.target and not self._timed
-        uneven = agrees and is_uneven(level) and self.evened < _EVENED
-        self.evened += uneven
-        unfolds = self._affordable(_finer(size, "space", False)) if uneven or is_folded(level) else None
+        hides = agrees and (is_uneven(level) or is_wound(level)) and self.evened < _EVENED
+        self.evened += hides
+        unfolds = self._affordable(_finer(size, "space", False)) if hides or is_folded(level) else None
         if agrees and unfolds is None:
             return self._confirmed(level, size, status, message)
         return self._unfolded(level, size) or self._refined_further(level, size, unfolds, status == "converged")

@@ -23,6 +23,7 @@ from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.strained import FOLDED, STRAINED, TORN
 from dlocore.problem.time_grid import smallest_n_t
+from dlocore.problem.winding import winds_unseen
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.sideways import may_leave_plane
@@ -152,6 +153,12 @@ def is_uneven(level: Level) -> bool:
     least, most = level.motion.slopes
     strain = max(1.0 - least, most - 1.0)
     return not level.motion.stopped and strain > max(STRAINED, FAR_MORE * level.motion.largest_strain)
+
+
+def is_wound(level: Level) -> bool:
+    """Tell whether a whole motion ends with so much torque that the cable may wind itself more finely than its grid."""
+    motion = level.motion
+    return not motion.stopped and winds_unseen(level.problem, motion.grid, motion.states[-1], motion.history)
 
 
 def is_folded(level: Level) -> bool:

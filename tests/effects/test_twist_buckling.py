@@ -95,6 +95,18 @@ def test_a_taut_rod_buckles_above_loves_moment():
     assert -offset / slope == pytest.approx(1.0, abs=5e-3)  # 33 control points put it 0.3 % too high
 
 
+def test_grids_that_are_too_coarse_for_the_helix_of_a_taut_rod_do_not_agree_on_its_axis():
+    # four turns of a helix, 2.57 mm off the axis and of 6.04 N on 129 and 257 control points. On 9 and 13 the rod had
+    # stayed straight, at an estimate of 0.4 mm
+    found = predict(taut(1.1, 5.0, 1100.0))
+    assert found.status == "converged", found.message
+    off = np.linalg.norm(found.surface.positions(np.linspace(0.0, 1.0, 201), [5.0])[0, :, 1:], axis=1).max()
+    assert off == pytest.approx(2.57e-3, abs=found.accuracy.error_estimate)
+    assert found.accuracy.error_estimate < 2e-3
+    grip = found.grasps[1]
+    assert abs(grip.reaction[-1, 0] - 6.04) < grip.reaction_error[-1]
+
+
 def ring(factor: float, n_u: int) -> tuple[float, float]:
     """Return how far a ring lies off its mean plane [m] at `factor` times Michell's twist, and its twist [rad].
 
