@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
+from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -313,6 +315,88 @@ def test_an_equilibrium_tells_of_moments_on_which_grids_agree_by_chance(gap, sti
     off = np.abs(np.abs(found.moments[:, 1]) - moment)
     assert (off <= found.moment_errors).all()
     assert (found.moment_errors < 0.15 * moment).all()
+
+
+@pytest.mark.parametrize(("hold", "factor", "share"), [("point", 24.0, 1 / 2), ("tangent", 72.0, 2 / 3)])
+def test_an_end_that_is_lifted_from_a_table_carries_what_beam_theory_says(hold, factor, share):
+    # EI y'''' = -mu g above the table, y = y' = y'' = 0 where the cable leaves it: the length l^4 = factor EI h/(mu g)
+    # is in the air, and the rest of its weight bears on the table there
+    height, stiffness = 0.01, 1e-2
+    lifted = Grasp(u=0.0, hold=hold, path=Move(displacement=(0.0, 0.0, height), duration=1.0))
+    heavy = cable(length=2.0, bending_stiffness=stiffness, axial_stiffness=1e6)
+    around = Environment(table=Table())
+    found = equilibrium(Scene(cable=heavy, shape=Straight(), grasps=(lifted,), environment=around, horizon=1), at=1.0)
+    weight = MU * G
+    free = (factor * stiffness * height / weight) ** 0.25
+    touch = (1.0 - share) * weight * free  # the force of the table at the point where the cable leaves it
+    u = np.linspace(0.0, 2.0, 201)
+    up = np.maximum(free - u, 0.0)
+    exact = (touch * up**3 / 6 - weight * up**4 / 24) / stiffness
+    np.testing.assert_allclose(found.positions(u)[:, 2], exact, atol=5e-5)  # the cable sinks in by 2e-5 at that point
+    assert found.reaction_errors is not None
+    assert found.reactions[0, 2] == pytest.approx(share * weight * free, rel=5e-3)
+    assert found.moments[0, 1] == pytest.approx(touch * free - weight * free**2 / 2, rel=5e-3, abs=1e-12)
+
+
+def test_a_stiff_cable_on_three_supports_loads_them_as_a_continuous_beam():
+    stiff = cable(length=2.0, bending_stiffness=5.0, axial_stiffness=1e3)
+    found = equilibrium(Scene(cable=stiff, shape=Straight(), grasps=tuple(Grasp(u=u) for u in (0, 1, 2)), horizon=1.0))
+    np.testing.assert_allclose(found.reactions[:, 2], np.array([3 / 16, 5 / 8, 3 / 16]) * 2 * MU * G, rtol=1e-5)
+
+
+def helix(radius: float, pitch: float, length: float, twist: float, n: int) -> tuple[ControlPoints, np.ndarray]:
+    """Return a helix about z, its sections twisted by `twist` [rad/m], and its unit tangents (n, 3)."""
+    u = np.linspace(0.0, length, n)
+    phi = u * np.cos(pitch) / radius
+    r = np.column_stack([radius * np.cos(phi), radius * np.sin(phi), u * np.sin(pitch), twist * u])
+    spline = make_interp_spline(u, r, k=3)
+    tangents = np.column_stack([-np.sin(phi), np.cos(phi), 0 * phi]) * np.cos(pitch) + [0.0, 0.0, np.sin(pitch)]
+    return ControlPoints(control_points=spline.c, knots=spline.t), tangents
+
+
+def test_a_rod_is_held_in_a_helix_by_the_wrench_of_kirchhoff():
+    # M = EI kappa b + GJ tau t, and a force along the axis: GJ tau cos a/R - EI cos^2 a sin a/R^2 (Love, art. 270)
+    R, a, bend, GJ, tau = 0.1, np.radians(40), 1e-2, 7e-3, 2.0
+    length = 0.6 * 2 * np.pi * R / np.cos(a)
+    shape, tangents = helix(R, a, length, tau, 81)
+    rod = cable(length=length, bending_stiffness=bend, torsional_stiffness=GJ, axial_stiffness=1e5)
+    ends = (Grasp(u=0.0, hold="clamp"), Grasp(u=length, hold="clamp"))
+    found = equilibrium(Scene(cable=rod, shape=shape, grasps=ends, environment=WEIGHTLESS, horizon=1.0))
+    assert found.error_estimate is not None
+    end = np.array([R * np.cos(1.2 * np.pi), R * np.sin(1.2 * np.pi), length * np.sin(a)])
+    normal = -end * [1, 1, 0] / R
+    moment = bend * np.cos(a) ** 2 / R * np.cross(tangents[-1], normal) + GJ * tau * tangents[-1]
+    force = GJ * tau * np.cos(a) / R - bend * np.cos(a) ** 2 * np.sin(a) / R**2
+    np.testing.assert_allclose(found.reactions[1], [0.0, 0.0, force], atol=1e-3 * abs(force))
+    np.testing.assert_allclose(found.moments[1], moment, atol=1e-3 * np.linalg.norm(moment))
+    energy = length / 2 * (bend * (np.cos(a) ** 2 / R) ** 2 + GJ * tau**2)
+    assert found.energy == pytest.approx(energy, rel=1e-4)
+
+
+def test_a_coil_spring_is_as_stiff_as_the_torsion_of_its_wire():
+    # a close coil: k = GJ/(2 pi n R^3); with a pitch of 4 degrees and clamps that do not turn, by Castigliano
+    R, a, n, bend, GJ, longer = 0.02, np.radians(4), 4, 1e-3, 8e-4, 5e-4
+    length = 2 * np.pi * R * n / np.cos(a)
+    shape, tangents = helix(R, a, length, 0.0, 40 * n + 1)
+    u = np.linspace(0.0, length, 40 * n + 1)
+    phi = u * np.cos(a) / R
+    arm = np.array([R, 0.0, length * np.sin(a)]) - np.column_stack([R * np.cos(phi), R * np.sin(phi), u * np.sin(a)])
+    of_force = np.cross(arm[:, None, :], np.eye(3)[None])  # moments of unit forces at the end, and unit moments
+    moments = np.concatenate([of_force, np.broadcast_to(np.eye(3), of_force.shape)], axis=1)
+    along = np.einsum("uid,ud->ui", moments, tangents)
+    product = np.einsum("uid,ujd->uij", moments, moments)
+    twisted = along[:, :, None] * along[:, None, :]
+    compliance = simpson((product - twisted) / bend + twisted / GJ, x=u, axis=0)
+    stiffness = np.linalg.inv(compliance)[2, 2]
+    assert stiffness == pytest.approx(GJ / (2 * np.pi * n * R**3), rel=0.01)
+    wire = Cable(
+        length=length, diameter=0.001, linear_density=0.01, bending_stiffness=bend, torsional_stiffness=GJ,
+        axial_stiffness=1e6, rest_shape="initial",
+    )  # fmt: skip
+    pulled = Grasp(u=length, hold="clamp", path=Move(displacement=(0.0, 0.0, longer), duration=1.0))
+    grasps = (Grasp(u=0.0, hold="clamp"), pulled)
+    found = equilibrium(Scene(cable=wire, shape=shape, grasps=grasps, environment=WEIGHTLESS, horizon=1.0), at=1.0)
+    assert found.reactions[1, 2] == pytest.approx(stiffness * longer, rel=1e-3)
 
 
 def test_a_time_limit_that_passes_on_a_finer_grid_is_told():
