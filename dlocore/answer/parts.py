@@ -124,6 +124,9 @@ class GraspReaction(Answered):
 class ContactForce(Answered):
     """Normal force and friction force of the table or an obstacle on the cable.
 
+    The forces are sampled at about 129 times. A strike is shorter than the time between two of them: it may not show,
+    and the integral of the forces over time is not its impulse.
+
     Attributes:
         name: "table", or "obstacles[i]" with the number of the obstacle in the scene.
         times: (k,) [s].
