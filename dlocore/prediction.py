@@ -22,6 +22,7 @@ from dlocore.answer.parts import (
 from dlocore.compiling.interrupts import interruptible
 from dlocore.errors import instance, number
 from dlocore.pickling import state_with
+from dlocore.scene.paths import Still
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville, nearest_line
 from dlocore.words import in_mm, in_ms, in_newtons
@@ -113,6 +114,13 @@ class Prediction:
             return []
         cable, told = self.scene.cable, []
         small = TINY * max(self.scene.weight, cast(float, cable.bending_stiffness) / cable.length**2)
+        advice = "If you need it, give a smaller target_error"
+        jumps = any(not isinstance(g.path, Still) and g.path.profile == "linear" for g in self.scene.grasps)
+        if jumps and not cable.bending_damping:
+            advice = (
+                "Where the velocity of a gripper jumps (profile linear), an undamped cable rings, the faster the finer "
+                "the grid: if you need the force, let grippers start and stop smoothly, or give bending_damping"
+            )
         for grasp in self.grasps:
             sizes = np.linalg.norm(grasp.reaction, axis=1)
             if grasp.reaction_error is None or not sizes.any():
@@ -121,7 +129,7 @@ class Prediction:
             if error > max(UNSURE * size, small):
                 told.append(
                     f"the force of the gripper at u = {grasp.u:.4g} m is uncertain: {in_newtons(size)}, give or take "
-                    f"{in_newtons(error)} (medians over time). If you need it, give a smaller target_error"
+                    f"{in_newtons(error)} (medians over time). {advice}"
                 )
         return told
 

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.catalogue import catalogue
 from benchmarks.force_errors import apart, rms
-from dlocore import Grasp, GraspReaction, Prediction, Quality, Scene, Straight, predict
+from dlocore import Grasp, GraspReaction, Move, Prediction, Quality, Scene, Straight, predict
 from dlocore.answer.compared import Series, errors, parts_of
 from dlocore.answer.reactions import taken_on
 from tests.solver.scenes import WEIGHTLESS, Floats, cable, march, paper_scene, refined
@@ -159,6 +159,31 @@ def test_forces_that_are_hardly_known_are_told_of_and_others_are_not() -> None:
     assert "give or take" in notes[0]
     assert notes[0] in told.message
     assert not [n for n in predict(replace(HANGING, quality=Quality())).notes if "give or take" in n]
+
+
+def test_a_smaller_target_is_no_advice_where_the_velocity_of_a_gripper_jumps() -> None:
+    # the error of the force is 0.6 N, and 1.6 N to a tenth of the target; damped, it is 6 mN and 0.1 mN
+    def advice(damping: float) -> tuple[float, list[str]]:
+        path = Move(displacement=(0.0, 0.2, 0.0), duration=0.5, profile="linear")
+        scene = Scene(
+            cable=cable(bending_stiffness=1e-2, bending_damping=damping),
+            shape=Straight(),
+            grasps=[Grasp(u=0.3, path=path)],
+            environment=replace(WEIGHTLESS, drag=0.1),
+            horizon=0.6,
+            quality=Quality(target_error=2e-3),
+        )
+        found = predict(scene)
+        assert found.grasps[0].reaction_error is not None
+        error = float(np.median(found.grasps[0].reaction_error))
+        return error, [note for note in found.notes if "is uncertain" in note]
+
+    error, (note,) = advice(0.0)
+    assert "start and stop smoothly, or give bending_damping" in note
+    assert "smaller target_error" not in note
+    damped, none = advice(1e-4)
+    assert damped < 0.1 * error
+    assert none == []
 
 
 def test_a_force_of_nothing_is_not_told_of() -> None:
