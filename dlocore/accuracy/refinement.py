@@ -22,7 +22,7 @@ from dlocore.levels.level import (
 )
 from dlocore.levels.progress import record_level
 from dlocore.levels.review import neglected
-from dlocore.levels.whole_march import Outcome, is_folded, is_uneven, is_wound, march_level, march_status
+from dlocore.levels.whole_march import Outcome, helix, is_folded, is_uneven, march_level, march_status
 from dlocore.problem.problem import Problem
 from dlocore.scene.scene import AUTO_TARGET, Quality
 from dlocore.solvers.march import RHO, STRONGLY_DAMPED
@@ -188,7 +188,7 @@ class _Climb:
         if self.torn == _TORN:
             return Outcome(level, status, message, self.changes.parts(level))
         agrees = self.estimate <= ACCEPT * self.target and not self._timed
-        hides = agrees and (is_uneven(level) or is_wound(level)) and self.evened < _EVENED
+        hides = agrees and (is_uneven(level) or helix(level) > self.target) and self.evened < _EVENED
         self.evened += hides
         unfolds = self._affordable(_finer(size, "space", False)) if hides or is_folded(level) else None
         if agrees and unfolds is None:

@@ -23,7 +23,7 @@ from dlocore.problem.discretisation import smallest_n_u
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.strained import FOLDED, STRAINED, TORN
 from dlocore.problem.time_grid import smallest_n_t
-from dlocore.problem.winding import winds_unseen
+from dlocore.problem.winding import unseen_helix
 from dlocore.solvers.march import RHO
 from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.stability.sideways import may_leave_plane
@@ -155,10 +155,10 @@ def is_uneven(level: Level) -> bool:
     return not level.motion.stopped and strain > max(STRAINED, FAR_MORE * level.motion.largest_strain)
 
 
-def is_wound(level: Level) -> bool:
-    """Tell whether a whole motion ends with so much torque that the cable may wind itself more finely than its grid."""
+def helix(level: Level) -> float:
+    """Return the radius of the helix [m] to which torque may wind the cable at the end of a whole motion, unseen."""
     motion = level.motion
-    return not motion.stopped and winds_unseen(level.problem, motion.grid, motion.states[-1], motion.history)
+    return 0.0 if motion.stopped else unseen_helix(level.problem, motion.grid, motion.states[-1], motion.history)
 
 
 def is_folded(level: Level) -> bool:

@@ -1,4 +1,4 @@
-"""Grids on which a twisted cable can't wind itself into the helix to which it buckles."""
+"""Helices to which a twisted cable buckles, and that its grid can't show."""
 
 import math
 
@@ -16,10 +16,12 @@ Floats = NDArray[np.float64]
 _SHOWN = 0.5 * math.pi  # phase of the helix within a span, at most: four spans a turn show it
 
 
-def winds_unseen(problem: Problem, grid: Grid, q: Floats, history: History) -> bool:
-    """Tell whether torque may buckle a cable to a helix with too many turns for its grid: it stays straight there.
+def unseen_helix(problem: Problem, grid: Grid, q: Floats, history: History) -> float:
+    """Return the largest radius of a helix [m] to which torque may buckle a cable unseen; 0 if its grid shows it.
 
-    A taut cable buckles where its torque M exceeds 2 sqrt(EI T), to a helix of wave number M/(2 EI) (Love, 1927).
+    A taut cable buckles where its torque M exceeds 2 sqrt(EI T), to a helix of wave number k = M/(2 EI) (Love, 1927).
+    With too few control points it stays straight. A helix of radius r takes r^2 k^2/2 of the length: at most what the
+    cable is longer than its chord, and what it is stretched.
 
     Args:
         problem: the posed scene.
@@ -28,12 +30,15 @@ def winds_unseen(problem: Problem, grid: Grid, q: Floats, history: History) -> b
         history: the history of the cable in that state.
     """
     if problem.twist is None or problem.bend is None:
-        return False
-    EI = problem.bend.bending_stiffness
+        return 0.0
+    EI, r = problem.bend.bending_stiffness, q[:, : problem.plane.dimensions]
     torque = problem.twist.torsional_stiffness * np.abs(history.past[:, TWIST_RATE] - history.memory[:, 2])
-    strain = axial_strain(grid.tables, q[:, : problem.plane.dimensions])
-    tension = max(0.0, problem.stretch.axial_stiffness * float(np.average(strain, weights=grid.tables.axial.w)))
+    strain = max(0.0, float(np.average(axial_strain(grid.tables, r), weights=grid.tables.axial.w)))
+    wave_number = torque / (2.0 * EI)
     cuts = np.unique(grid.knots)
     span = np.diff(cuts)[np.searchsorted(cuts, grid.tables.curvature.u) - 1]
-    unseen = (torque > 2.0 * math.sqrt(EI * tension)) & (torque / (2.0 * EI) * span > _SHOWN)
-    return bool(unseen.any())
+    buckles = torque > 2.0 * math.sqrt(EI * problem.stretch.axial_stiffness * strain)
+    unseen = buckles & (wave_number * span > _SHOWN)
+    chord = float(np.linalg.norm(r[-1] - r[0])) / problem.scene.cable.length
+    spare = max(0.0, 1.0 + 2.0 * strain - chord)
+    return math.sqrt(2.0 * spare) / float(wave_number[unseen].min()) if unseen.any() else 0.0

@@ -25,7 +25,7 @@ from dlocore.problem.held_ends import held_back
 from dlocore.problem.notes import cable_notes
 from dlocore.problem.problem import Problem, pose
 from dlocore.problem.strained import FOLDED, TORN, strain_notes
-from dlocore.problem.winding import winds_unseen
+from dlocore.problem.winding import unseen_helix
 from dlocore.scene.scene import Scene
 from dlocore.solvers.monitor import Monitor, time_allowed
 from dlocore.spline import design_matrix, in_range
@@ -222,8 +222,8 @@ def _refined(problem: Problem, sizes: list[int], at: float, target: float, monit
         if found:
             change = _apart(*found[-1], grid, settled)
         found = (*found[-1:], (grid, settled))
-        seen = not _is_folded(grid, settled) and not winds_unseen(problem, grid, settled.q, settled.history)
-        if change <= target and seen:
+        unseen = max(change, unseen_helix(problem, grid, settled.q, settled.history))
+        if unseen <= target and not _is_folded(grid, settled):
             break
     message = "Forces balance." if len(sizes) == 1 else _agreed(change)
     if settled.rest == "restless":
