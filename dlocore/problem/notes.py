@@ -27,7 +27,8 @@ OVERSHOOTS = 0.5  # of the extent of waypoints: farthest that a path may swing o
 OUT = 1e-2  # ... or this part of the length, if that is more
 CLOSE = 0.1  # of the median time between waypoints: in less time noise may throw a smooth path off. A note if ...
 THROWN = 1e-3  # ... it does so by more than this part of the length, ...
-_MORE = 10.0  # ... and by more than this times the distance of the close waypoints from a path without them
+_MORE = 5.0  # ... and by more than this times the distance of the close waypoints from a path without them, ...
+_NEAR = 1e-2  # ... which is less than THROWN, or than this part of the extent of the waypoints: a late time stamp
 _BETWEEN = 8  # places between each two waypoints at which a path is evaluated
 _PLACES = 65  # of a start at which it is evaluated
 
@@ -223,7 +224,7 @@ def _of_overshoots(scene: Scene) -> list[str]:
 
 
 def _of_close_times(scene: Scene) -> list[str]:
-    """Return notes on waypoints whose times are so close that noise between them throws a smooth path off."""
+    """Return notes on waypoints whose times are so close that noise or a late time throws a smooth path off."""
     notes = []
     for i, grasp in enumerate(scene.grasps):
         path = grasp.path
@@ -240,12 +241,13 @@ def _of_close_times(scene: Scene) -> list[str]:
         off = np.linalg.norm(given[close] - without.at(times[close], given[0]), axis=1)
         k = int(np.argmax(thrown))
         much = THROWN * scene.cable.length
-        if off.max() < much and thrown[k] > max(much, _MORE * off.max()):
+        near = max(much, _NEAR * float(np.linalg.norm(np.ptp(given, axis=0))))
+        if off.max() < near and thrown[k] > max(much, _MORE * off.max()):
             j = int(np.flatnonzero(close)[np.argmin(np.abs(times[close] - t[k]))])
             gap = times[j] - times[j - 1]
             notes.append(
                 f"primitives[{i}].path.times[{j}] is {gap:.2g} s after the one before it, others are {usual:.2g} s "
-                f"apart: noise between the two throws the smooth path off by up to {in_mm(thrown[k])}, at "
+                f"apart: their noise, or a late time, throws the smooth path off by up to {in_mm(thrown[k])}, at "
                 f"{grasp.start + t[k]:.4g} s. Leave this waypoint out"
             )
     return notes

@@ -59,6 +59,15 @@ def test_three_times_that_are_all_but_the_same_are_told_of() -> None:
     assert any("throws the smooth path off" in note for note in notes(times, smooth(EVEN)))
 
 
+@pytest.mark.parametrize(("gap", "least"), [(5e-5, 0.1), (2e-4, 0.02), (5e-4, 5e-3)])
+def test_a_late_time_stamp_of_a_log_is_told_of_with_how_far_the_path_is_off(gap: float, least: float) -> None:
+    times, x = 2.0 * EVEN, 6.0 * smooth(EVEN)  # 125 Hz; up to 0.3 m/s
+    times[200] = times[201] - gap  # this message came with the next one
+    (note,) = notes(times, x, 0.0)
+    assert note.startswith(f"primitives[0].path.times[201] is {gap:.2g} s after the one before it, others are 0.008")
+    assert 1e-3 * float(note.split("up to ")[1].split(" mm")[0]) > least
+
+
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("noise", [0.0, NOISE, 1e-3])
 def test_noise_at_even_times_and_at_trembling_ones_is_not_told_of(noise: float, seed: int) -> None:
