@@ -23,7 +23,7 @@ _LINE = {"schema": {"$ref": "#/components/schemas/BatchLine"}}  # of each line, 
     summary="Predict many scenes",
     responses={
         200: {"description": "JSON lines. The schema `BatchLine` describes each line.", "content": {LINES: _LINE}},
-        **described.failures(401, 404, 406, 413, 415, 422, 429, 503),
+        **described.failures(401, 404, 406, 409, 413, 415, 422, 429, 503),
     },
 )
 async def batch(

@@ -76,7 +76,7 @@ PREDICT: Responses = {
         "content": {JSON: {"schema": _JOB}},
         "headers": _location("its state and, later, the prediction"),
     },
-    **failures(401, 404, 406, 413, 415, 422, 429, 503, 504),
+    **failures(401, 404, 406, 409, 413, 415, 422, 429, 503, 504),
 }
 READ: Responses = {
     200: {

@@ -27,6 +27,7 @@ from app.service.service import Service, TheService
 from dlocore.answer.parts import Status
 
 router = APIRouter(prefix="/v1/predictions", tags=["predictions"], route_class=JsonRoute)
+_PART = "this part of it is available once it is done and stored"
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d([.,]\d+)?)?([Zz]|[+-]\d\d:?\d\d)", re.ASCII)
 
 
@@ -177,7 +178,7 @@ async def read(id: str, request: Request, service: TheService) -> Response:
     if job is None:
         raise no_such_run(id)
     if form != JSON:
-        raise not_done(job)
+        raise job.not_done(_PART)
     return _state(job)
 
 
@@ -226,12 +227,6 @@ async def follow(
     return events.of_document(document, seen)
 
 
-def not_done(job: Job) -> ProblemError:
-    """Return the problem of a request for a part of a prediction that has no answer."""
-    detail = f"The prediction is {job.state}; this part of it is available once it is done and stored."
-    return ProblemError(409, "not-done", detail, headers={} if job.finished.is_set() else {"Retry-After": "1"})
-
-
 async def part(service: Service, read: Callable[[str], bytes | None], id: str) -> bytes:
     """Return what `read` finds of the stored run `id`.
 
@@ -240,7 +235,7 @@ async def part(service: Service, read: Callable[[str], bytes | None], id: str) -
     """
     content, job = await _found(service, read, id)
     if content is None:
-        raise no_such_run(id) if job is None else not_done(job)
+        raise no_such_run(id) if job is None else job.not_done(_PART)
     return content
 
 

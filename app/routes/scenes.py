@@ -41,8 +41,8 @@ async def explain(
 
 
 def _explained(service: Service, request: PredictionRequest) -> dict[str, Any]:
-    errors = scene_errors(request, service.runs.motion)
+    errors = scene_errors(request, service.motion)
     if errors:
         raise bad_scene([BadField.from_scene_error(error) for error in errors])
-    found = plan(to_scene(request, service.runs.motion))
+    found = plan(to_scene(request, service.motion))
     return {**vars(found), "effects": [vars(effect) for effect in found.effects]}

@@ -85,7 +85,7 @@ def _plan(wanted: StudyRequest, service: Service) -> StudyPlan:
         scenes: dict[str, Scene] = {}
         for name, scene in wanted.scenes.items():
             with within(f"scenes.{name}"):
-                scenes[name] = to_scene(scene, service.runs.motion)
+                scenes[name] = to_scene(scene, service.motion)
         asked["scenes"] = scenes
     if wanted.effects is not None:
         asked["effects"] = {

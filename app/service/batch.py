@@ -102,7 +102,7 @@ def _scene(service: Service, data: Any) -> tuple[PredictionRequest, Scene]:
         request = PredictionRequest.model_validate(data)
     except ValidationError as error:
         raise bad_scene(bad_fields(error.errors(), data)) from None
-    return request, to_scene(request, service.runs.motion)
+    return request, to_scene(request, service.motion)
 
 
 def check_size(count: int, most: int, field: str) -> None:

@@ -67,6 +67,11 @@ class Job:
         arrays = () if self.material is None else vars(self.material).values()
         return len(self.document or b"") + sum(array.nbytes for array in arrays)
 
+    def not_done(self, when: str, field: str = "") -> ProblemError:
+        """Return the problem of a request for what it does not have (yet); `when` says which have it, or when."""
+        detail = f"{field and f'{field}: '}The prediction is {self.state}; {when}."
+        return ProblemError(409, "not-done", detail, headers={} if self.finished.is_set() else {"Retry-After": "1"})
+
     def cancel(self) -> None:
         """Stop it: at once if it is queued, at the solver's next check if it is running."""
         self.cancelled.set()

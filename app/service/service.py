@@ -16,7 +16,7 @@ from fastapi import Depends, Request
 
 from app.http.problems import ProblemError, no_such_run, problem_of
 from app.logs import RUN
-from app.schemas import PredictionRequest, from_prediction, to_scene
+from app.schemas import Motion, PredictionRequest, from_prediction, to_scene
 from app.schemas.response import OPTIONAL_FIELDS, iteration_document
 from app.service.jobs import CANCEL_TIME, Job, Jobs
 from app.service.measurements import Measurement, Measurements, Work
@@ -140,11 +140,12 @@ class Service:
 
         Raises:
             SceneError: the scene is impossible.
-            ProblemError: 404 if there is no run `like`, 429 if the queue is full, 503 if not ready or stopping.
+            ProblemError: 404 if there is no run `like`, 409 if it has no answer, 429 if the queue is full, 503 if not
+                ready or stopping.
         """
         self.check_ready()
         await self.check_known(like)
-        scene = await anyio.to_thread.run_sync(to_scene, request, self.runs.motion)
+        scene = await anyio.to_thread.run_sync(to_scene, request, self.motion)
         self.worker.admit()
         assert self._tasks is not None
         job = Job(store)
@@ -154,10 +155,13 @@ class Service:
         return job
 
     async def check_known(self, like: str | None) -> None:
-        """Raise a 404 problem if `like` is given but is not the id of a run."""
+        """Raise a problem if `like` is given and is not the id of a run (404) or of one without an answer (409)."""
         if like is None or self.recent.get(like) is not None:
             return
-        if await anyio.to_thread.run_sync(self.runs.document, like) is None:
+        job = self.jobs.get(like)
+        if await anyio.to_thread.run_sync(self.document, like) is None:
+            if job is not None:
+                raise job.not_done("only one that is done can be reused", "like")
             raise no_such_run(like, "like")
 
     async def _work(self, job: Job, scene: Scene, request: PredictionRequest, raw: bytes, like: str | None) -> None:
@@ -288,6 +292,21 @@ class Service:
         """Return the answer of the run `id`, stored or not, as JSON, or None if there is none; for any thread."""
         job = self.jobs.get(id)
         return job.document if job is not None and job.document is not None else self.runs.document(id)
+
+    def motion(self, id: str) -> Motion | None:
+        """Return the motion of the stored run `id`, or None if there is no such run; for any thread.
+
+        Raises:
+            SceneError: the run is known, but not done, or not stored.
+        """
+        job = self.jobs.get(id)
+        motion = self.runs.motion(id)
+        if motion is not None or job is None:
+            return motion
+        if job.state == "done" and job.store:  # it ended during the search
+            return self.runs.motion(id)
+        state = "not stored" if job.state == "done" else job.state
+        raise SceneError("shape.id", id, "the id of a stored prediction", f"That prediction is {state}")
 
     def material(self, id: str) -> MaterialMotion | None:
         """Return what the sections of the cable remember in the run `id`, stored or not, or None; for any thread."""

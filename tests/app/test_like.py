@@ -3,8 +3,10 @@
 import json
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
 
+from app.service.jobs import Job, State
 from app.service.service import Service
 from app.store.recent import Recent, size_of
 from dlocore import Prediction, predict
@@ -61,6 +63,45 @@ def test_an_id_that_is_none_is_refused(client: TestClient) -> None:
         the_problem(client.post("/v1/predictions", params={"like": like}, json=moved(0.0)), status)
         body = {"scenes": [moved(0.0)], "like": like}
         the_problem(client.post("/v1/predictions:batch", json=body), status)
+
+
+def job_in(client: TestClient, state: State) -> Job:
+    """Return a prediction that is not stored and has no answer, in this state."""
+
+    def put() -> Job:
+        job = Job(store=False)
+        client.app.state.service.jobs.add(job)  # type: ignore[attr-defined]
+        job.begin()
+        if state != "running":
+            job.end(state)
+        return job
+
+    assert client.portal is not None
+    return client.portal.call(put)
+
+
+@pytest.mark.parametrize(("state", "wait"), [("running", "1"), ("cancelled", None)])
+def test_one_without_an_answer_is_refused_with_its_state(client: TestClient, state: State, wait: str | None) -> None:
+    id = job_in(client, state).id
+    body = {"scenes": [moved(0.0)], "like": id}
+    for path, query, sent in (("", {"like": id}, moved(0.0)), (":batch", {}, body)):
+        response = client.post(f"/v1/predictions{path}", params=query, json=sent)
+        told = the_problem(response, 409)["detail"]
+        assert told == f"like: The prediction is {state}; only one that is done can be reused."
+        assert response.headers.get("retry-after") == wait
+
+
+@pytest.mark.parametrize(
+    ("state", "told"), [("running", "running"), ("cancelled", "cancelled"), ("done", "not stored")]
+)
+def test_a_start_from_one_that_is_not_stored_is_refused_with_its_state(
+    client: TestClient, state: State, told: str
+) -> None:
+    scene = paper_scene(shape={"kind": "prediction", "id": job_in(client, state).id})
+    for path in ("/v1/predictions", "/v1/scenes:explain"):
+        (error,) = the_problem(client.post(path, json=scene), 422)["errors"]
+        assert error["message"].startswith(f"That prediction is {told}.")
+    assert f"That prediction is {told}." in client.post("/v1/predictions:batch", json={"scenes": [scene]}).text
 
 
 def test_the_oldest_are_forgotten_when_there_are_too_many() -> None:
