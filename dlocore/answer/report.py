@@ -35,6 +35,12 @@ def planned_effects(problem: Problem) -> tuple[EffectReport, ...]:
     return tuple(EffectReport(name, choice.active, choice.reason) for name, choice in problem.choices.items())
 
 
+def _halves(knots: Floats) -> Floats:
+    """Return the ends and the middles of all spans of a spline, rising."""
+    ends = np.unique(knots)
+    return np.sort(np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])]))
+
+
 def effect_reports(
     problem: Problem,
     material: Callable[[], MaterialMotion | None],
@@ -51,15 +57,15 @@ def effect_reports(
     masses = cable.point_masses
     at_masses = surface([one.u for one in masses], t, dt=2)[..., :3] if masses else np.zeros((len(t), 0, 3))
     heavy = np.linalg.norm(at_masses, axis=-1) @ np.array([one.mass for one in masses])
-    curvature = surface.curvature(u, t)
-    tau = surface.twist_rate(u, t)
+    places, instants = _halves(surface.knots_u), _halves(surface.knots_t)  # peaks of bends are as narrow as spans
+    curvature, tau = surface.curvature(places, instants), surface.twist_rate(places, instants)
     mu, EI = cable.linear_density, cast(float, cable.bending_stiffness)
     drag = environment.drag * speed + environment.drag_quadratic * speed**2
     weight = problem.scene.weight
     sizes: dict[str, tuple[float, str]] = {
         "inertia": (float((mu * np.trapezoid(acceleration, u, axis=1) + heavy).max()), "N"),
         "drag": (float(np.trapezoid(drag, u, axis=1).max()), "N"),
-        "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, t, axis=0)).max()), "N m"),
+        "damping": (float(cable.bending_damping * np.abs(np.gradient(curvature, instants, axis=0)).max()), "N m"),
         "gravity": (weight, "N"),
         "stretch": (float(np.abs(stretch().strain).max()), "axial strain"),
         "bend": (float(EI * curvature.max()), "N m"),
