@@ -404,19 +404,32 @@ def _steps_of(path: str) -> list[str | int]:
 def _part(scene: Scene, path: str) -> Any:
     """Return the part of the scene at a path."""
     value: Any = scene
+    where = ""
     for step in _steps_of(path):
         try:
             value = value[step] if isinstance(step, int) else _field(value, step)
         except (AttributeError, IndexError, TypeError):
-            raise SceneError("wrt", path, "the path of a number of the scene") from None
+            raise _no_number(path, where or "The scene", value) from None
+        where += f"[{step}]" if isinstance(step, int) else f".{step}" if where else step
     return value
+
+
+def _no_number(path: str, where: str, value: Any) -> SceneError:
+    """Return the error of a path that leads to no number; `value` is what lies at `where`."""
+    if is_dataclass(value):
+        what = f"has {', '.join(f.name for f in fields(value))}"
+    elif isinstance(value, np.ndarray | tuple) and len(value):
+        what = f"has [0] to [{len(value) - 1}]"
+    else:
+        what = f"is {value!r}"
+    return SceneError("wrt", path, "the path of a number of the scene", f"{where} {what}")
 
 
 def _number(scene: Scene, path: str) -> float:
     """Return the number at a path of the scene."""
     value = _part(scene, path)
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise SceneError("wrt", path, "the path of a number of the scene")
+        raise _no_number(path, "It", value)
     return float(value)
 
 

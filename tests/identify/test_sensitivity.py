@@ -188,12 +188,25 @@ def test_contact_that_a_prediction_had_to_make_stiffer_is_as_stiff_beside_it() -
 
 
 @pytest.mark.parametrize(
-    "path", ["cable.colour", "grasps[3].u", "grasps[0].start", "cable", "environment.gravity[7]", "__class__", "a b"]
+    ("path", "told"),
+    [
+        ("cable.colour", "cable has length, diameter, "),
+        ("grasps[3].u", "grasps has [0] to [0]."),
+        ("grasps[0].start", "grasps[0] has u, path, hold, "),
+        ("primitives[0].u", "The scene has cable, shape, grasps, "),
+        ("cable", "It has length, diameter, "),
+        ("cable.rest_shape", "It is 'straight'."),
+        ("environment.gravity", "It has [0] to [2]."),
+        ("environment.gravity[7]", "environment.gravity has [0] to [2]."),
+        ("__class__", "The scene has cable, shape, "),
+        ("a b", "Allowed: a path such as"),
+    ],
 )
-def test_a_path_that_leads_to_no_number_is_refused(path: str) -> None:
+def test_a_path_that_leads_to_no_number_is_refused_with_what_there_is(path: str, told: str) -> None:
     allowed = "(the path of a number of the scene|a path such as)"
-    with pytest.raises(SceneError, match=rf"wrt: got [^:]*\. Allowed: {allowed}"):
+    with pytest.raises(SceneError, match=rf"wrt: got [^:]*\. Allowed: {allowed}") as refused:
         sensitivities(predict(scene()), [path])
+    assert str(refused.value).startswith(f"wrt: got {path}. {told}")
 
 
 def test_one_path_in_place_of_a_list_of_them_is_refused() -> None:
