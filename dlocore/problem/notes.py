@@ -23,6 +23,7 @@ MANY_TURNS = 3.0  # of a gripper in one move: with more, a note asks whether deg
 _DEGREES = 5.0  # ... multiples of this
 NO_TURN = 1e-4  # a quaternion whose last number is nearer to 1 than this is no turn if that number is w
 _SAME_TIME = 1e-9  # relative
+WAITS = 5.0  # of the duration of a path: a longer wait before it gets a note, if nothing else moves the cable meanwhile
 OVERSHOOTS = 0.5  # of the extent of waypoints: farthest that a path may swing out of their box without a note, ...
 OUT = 1e-2  # ... or this part of the length, if that is more
 CLOSE = 0.1  # of the median time between waypoints: in less time noise may throw a smooth path off. A note if ...
@@ -38,6 +39,7 @@ def scene_notes(scene: Scene) -> list[str]:
     return [
         *cable_notes(scene),
         *_of_times(scene),
+        *_of_waiting(scene),
         *_of_turns(scene),
         *_of_overshoots(scene),
         *_of_close_times(scene),
@@ -139,6 +141,21 @@ def _of_times(scene: Scene) -> list[str]:
         f"primitives[{i}] never holds the cable: it closes at {grasp.start:g} s and the horizon is {horizon:g} s"
         for i, grasp in enumerate(scene.grasps)
         if grasp.start >= horizon
+    ]
+
+
+def _of_waiting(scene: Scene) -> list[str]:
+    """Return a note on recorded paths that begin long after the scene, as if by the clock of their recorder."""
+    moving = [(i, grasp) for i, grasp in enumerate(scene.grasps) if grasp.path.duration > 0.0]
+    if not moving or not all(isinstance(g.path, Waypoints) and g.start == 0.0 for _, g in moving):
+        return []
+    spans = {i: cast(Floats, cast(Waypoints, grasp.path).times)[[0, -1]] for i, grasp in moving}
+    first, (begin, end) = min(spans.items(), key=lambda span: float(span[1][0]))
+    if not begin > WAITS * (end - begin):
+        return []
+    return [
+        f"primitives[{first}].path.times begin at {begin:.6g} s, and no gripper moves before: times count from when a "
+        "gripper closes, so subtract the first if they are those of a recorder"
     ]
 
 

@@ -31,6 +31,7 @@ _PROFILES: dict[str, tuple[float, ...]] = {
     "cubic": (0.0, 3.0, -2.0, 0.0, 0.0),
 }
 MAX_WAYPOINTS = 100_000
+LATEST = 1e4  # [s], of a waypoint
 MAX_STOPS = 1000  # waypoints at which a gripper stops: each is an event
 SAME_TURN = 1e-9  # [rad]: orientations that differ by less are the same: the gripper does not turn
 DRAWN = 0.2  # [s], in which a gripper that closes beside its first waypoint draws the cable to its path
@@ -172,7 +173,10 @@ class Waypoints(Checked):
             raise SceneError(f"times[{k + 1}]", times[k + 1], "times that rise by more than 1e-6 s")
         if times[0] < 0.0:
             raise SceneError("times[0]", times[0], "at least 0 [s]")
-        number("times[-1]", float(times[-1]), above=1e-4, at_most=1e4, unit="s")
+        if times[0] > LATEST:
+            clock = "Times count from when the gripper closes, and these look like those of a clock"
+            raise SceneError("times[0]", times[0], f"at most {LATEST:g} [s], such as 0", clock)
+        number("times[-1]", float(times[-1]), above=1e-4, at_most=LATEST, unit="s")
         positions = array("positions", self.positions, shape=(None, 3), unit="m")
         if len(positions) != len(times):
             raise SceneError("positions", counted(len(positions), "position"), f"as many as times ({len(times)})")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dlocore import Grasp, Move, Scene, Straight, Waypoints
+from dlocore import Grasp, Move, Scene, SceneError, Straight, Waypoints
 from dlocore.problem.notes import scene_notes
 from dlocore.scene.paths import Path, Still, Through
 from tests.solver.scenes import Floats, cable
@@ -77,6 +77,25 @@ def test_one_that_begins_at_once_or_waits_for_another_time_is_not() -> None:
     for times in ([0.0, 1.0], [0.5, 2.0]):
         assert notes(Waypoints(times=times, positions=PLACE[:2]), grasp_time=1.0) == []
     assert notes(Waypoints(times=[1.0, 2.0], positions=PLACE[:2])) == []
+
+
+def recorded(begins: float, other: Grasp) -> list[str]:
+    path = Waypoints(times=[begins, begins + 0.5, begins + 1.0], positions=PLACE[:3])
+    grasps = [other, Grasp(u=0.0, path=path)]
+    return scene_notes(Scene(cable=cable(), shape=Straight(), grasps=grasps))
+
+
+def test_a_path_by_the_clock_of_a_recorder_is_asked_about() -> None:
+    (note,) = recorded(1000.0, Grasp(u=1.0))
+    assert note.startswith("primitives[1].path.times begin at 1000 s, and no gripper moves before")
+    with pytest.raises(SceneError, match=r"times\[0\]: got 1700000000\.0\. Times count from when the gripper closes"):
+        recorded(1.7e9, Grasp(u=1.0))
+
+
+@pytest.mark.parametrize("begins", [0.0, 2.0, 4.9, 1000.0])
+def test_one_that_waits_for_another_gripper_or_not_long_is_not(begins: float) -> None:
+    moved = Grasp(u=1.0, path=Move(displacement=(0.0, 0.1, 0.0), duration=1.0))
+    assert recorded(begins, moved if begins > 4.9 else Grasp(u=1.0)) == []
 
 
 @pytest.mark.parametrize("profile", ["spline", "minimum_jerk"])
