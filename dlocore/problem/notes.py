@@ -53,13 +53,11 @@ def cable_notes(scene: Scene) -> list[str]:
 
 
 def start_notes(scene: Scene, start: StartCurve) -> list[str]:
-    """Return a note on a start that is not where it was given; for bows see `side_notes`."""
-    if start.bow or start.aside:
-        return []
+    """Return a note on a start that is not where it was given, apart from a bow, of which `side_notes` tell."""
     length = scene.cable.length
     u = np.linspace(0.0, length, _PLACES)
     moved = float(np.linalg.norm(start(u) - start_curve(scene.shape, length)(u), axis=1).max())
-    if moved <= SAME_START * length:
+    if moved <= SAME_START * length + abs(start.bow) + start.aside:
         return []
     why = "to meet the first waypoints of its grippers, to lie on the table, or to be outside obstacles"
     return [f"the start is moved by up to {in_mm(moved)} from where it was given, {why}"]

@@ -7,6 +7,7 @@ import pytest
 
 from dlocore import Environment, Grasp, Prediction, Quality, Scene, SceneError, Straight, Table, Waypoints, predict
 from dlocore.problem.brought import GRASP_TOLERANCE
+from dlocore.problem.notes import start_notes
 from dlocore.problem.problem import pose
 from dlocore.scene.paths import DRAWN, Move, held_at
 from tests.solver.scenes import Floats, cable
@@ -64,6 +65,18 @@ def test_between_two_grippers_it_bends_no_more_than_it_has_to(shape: Any) -> Non
     bends: Floats = np.linalg.norm(start(u, 2) - given(u, 2), axis=1)
     assert bends.max() < 1.2 * 6.0 * np.linalg.norm(asides[1] - asides[0]) / 0.6**2
     np.testing.assert_allclose(start([0.2, 0.8], 1), given([0.2, 0.8], 1), atol=1e-3)
+
+
+@pytest.mark.parametrize("aside", [0.0, 8e-3])
+def test_a_start_that_is_also_given_a_bow_is_told_to_be_moved_only_if_its_grippers_move_it(aside: float) -> None:
+    pushed = [[[0.0, aside, 0.0], [0.2, aside, 0.0]], [[1.0, aside, 0.0], [1.0, aside, 0.0]]]
+    grasps = [
+        Grasp(u=u, path=Waypoints(times=[0.0, 1.0], positions=at)) for u, at in zip((0.0, 1.0), pushed, strict=True)
+    ]
+    scene = carried(*grasps)
+    start = pose(scene).start
+    assert start.bow or start.aside
+    assert bool(start_notes(scene, start)) == bool(aside)
 
 
 def test_beyond_the_tolerance_the_first_waypoint_is_refused() -> None:
