@@ -22,6 +22,7 @@ from dlocore.problem.grid import Grid
 from dlocore.problem.holding import Starts, close_grasps, hold
 from dlocore.problem.plane import leftwards, turned_about
 from dlocore.problem.problem import Problem
+from dlocore.problem.squeezed import in_long_waves, is_squeezed
 from dlocore.problem.tension import at_points
 from dlocore.scene.paths import Waypoints
 from dlocore.scene.scene import Material
@@ -374,11 +375,14 @@ def consistent_start(problem: Problem, grid: Grid, *, touches: bool = True) -> F
     kept = [laws.STRETCH, *([laws.CONTACT, laws.TABLE] if touches else [])]
     active[[row for row in range(laws.COUNT) if row not in kept]] = 0
     history.axial[:, 0] = _start_strain(problem, grid)
-    strength = 1e-3 * parameters[0, 0] * (grid.n_u / problem.scene.cable.length) ** 2
+    tables, length = grid.tables, problem.scene.cable.length
+    strength = 1e-3 * parameters[0, 0] * (grid.n_u / length) ** 2
+    if is_squeezed(problem):
+        tables, strength = in_long_waves(tables, parameters[0, 0], length)
     q = start.copy()
     relax(
-        line.axes, q, start, strength, np.zeros_like(q), grid.tables, active, parameters, history, held.elimination,
-        held.offsets[0], 1e-10 * problem.scene.cable.length, 50,
+        line.axes, q, start, strength, np.zeros_like(q), tables, active, parameters, history, held.elimination,
+        held.offsets[0], 1e-10 * length, 50,
     )  # fmt: skip
     return np.concatenate([q, grid.start[:, line.nc :]], axis=1)
 

@@ -5,11 +5,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dlocore import Environment, Grasp, Prediction, Quality, Scene, SceneError, Straight, Table, Waypoints, predict
+from dlocore import (
+    Environment,
+    Grasp,
+    Points,
+    Prediction,
+    Quality,
+    Scene,
+    SceneError,
+    Straight,
+    Table,
+    Waypoints,
+    predict,
+)
+from dlocore.answer.frames import rates_of
 from dlocore.problem.brought import GRASP_TOLERANCE
+from dlocore.problem.discretisation import axial_strain, make_grid
 from dlocore.problem.notes import start_notes
 from dlocore.problem.problem import pose
+from dlocore.problem.squeezed import is_squeezed
 from dlocore.scene.paths import DRAWN, Move, held_at
+from dlocore.solvers.monitor import Monitor
+from dlocore.spline import spline_at
+from dlocore.statics.statics import start_grid
 from tests.solver.scenes import Floats, cable
 
 MOVED = (
@@ -77,6 +95,46 @@ def test_a_start_that_is_also_given_a_bow_is_told_to_be_moved_only_if_its_grippe
     start = pose(scene).start
     assert start.bow or start.aside
     assert bool(start_notes(scene, start)) == bool(aside)
+
+
+def squeezed(less: float) -> Scene:
+    """Return an arc of 1 m in two clamps that begin nearer to each other than its points, by a part of the length."""
+    t = np.linspace(-0.8, 0.8, 81)
+    points = np.column_stack([np.sin(t), 0.0 * t, 1.0 - np.cos(t)]) / 1.6
+    held = []
+    for u, end, way in ((0.0, points[0], 0.5), (1.0, points[-1], -0.5)):
+        begin = end + [way * less, 0.0, 0.0]
+        held.append(Grasp(u=u, hold="clamp", path=Waypoints(times=[0.0, 1.0], positions=[begin, begin + UP])))
+    return Scene(
+        cable=cable(), shape=Points(points=points, settle=True), grasps=held, environment=Environment(drag=0.1)
+    )
+
+
+def test_a_start_that_two_grippers_squeeze_bows_out_in_long_waves_that_are_the_same_on_all_grids() -> None:
+    """It wrinkled as finely as its grid allowed: 3 mm elsewhere, and bent 130 times as sharply as its points."""
+    problem = pose(squeezed(0.018))
+    u = np.linspace(0.0, 1.0, 401)
+    coarse, fine = (make_grid(problem, n) for n in (33, 216))
+    places = [spline_at(grid.knots, grid.start[:, :3], u, 0) for grid in (coarse, fine)]
+    np.testing.assert_allclose(places[0], places[1], atol=2e-4)
+    assert np.abs(axial_strain(fine.tables, fine.start[:, :3])).max() < 5e-4
+    bends = np.linalg.norm(spline_at(fine.knots, fine.start[:, :3], u, 2), axis=1)
+    assert bends.max() < 5.0  # 1.6 of the points [1/m]
+
+
+def test_clamps_that_squeeze_a_start_are_not_turned_against_each_other_as_it_settles() -> None:
+    """Wrinkles out of the plane, which smooth out, left their writhe as twist: 0.2 rad, on the fine grid alone."""
+    problem = pose(squeezed(0.018), {"side": "it leaves its plane", "twist": "it turns"})
+    assert problem.twist is not None
+    for n_u in (33, 300):
+        rest = start_grid(problem, n_u, Monitor())
+        rates = rates_of(problem, rest, rest.start[None], rest.history.past[None])[0]
+        assert abs(float(rest.tables.curvature.w @ rates)) < 1e-3, n_u
+
+
+@pytest.mark.parametrize(("less", "bows"), [(0.004, False), (0.006, True), (0.0, False), (-0.01, False)])
+def test_what_hardly_squeezes_a_start_is_no_reason_to_smooth_it(less: float, bows: bool) -> None:
+    assert is_squeezed(pose(squeezed(less))) == bows
 
 
 def test_beyond_the_tolerance_the_first_waypoint_is_refused() -> None:
