@@ -34,7 +34,7 @@ MOVED = (
     "the start is moved by up to {:g} mm from where it was given, "
     "to meet the first waypoints of its grippers, to lie on the table, or to be outside obstacles"
 )
-UP = np.array([0.0, 0.05, 0.0])
+X, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.05, 0.0])
 ROUGH = Environment(drag=0.1, table=Table(friction=0.3))
 
 
@@ -103,7 +103,7 @@ def squeezed(less: float) -> Scene:
     points = np.column_stack([np.sin(t), 0.0 * t, 1.0 - np.cos(t)]) / 1.6
     held = []
     for u, end, way in ((0.0, points[0], 0.5), (1.0, points[-1], -0.5)):
-        begin = end + [way * less, 0.0, 0.0]
+        begin = end + way * less * X
         held.append(Grasp(u=u, hold="clamp", path=Waypoints(times=[0.0, 1.0], positions=[begin, begin + UP])))
     return Scene(
         cable=cable(), shape=Points(points=points, settle=True), grasps=held, environment=Environment(drag=0.1)
