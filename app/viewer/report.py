@@ -192,10 +192,10 @@ def effect_note(effect: EffectReport, cost: float | None) -> str:
     if cost is not None:
         verb = "costs" if cost >= 0 else "saves"
         price = f" <b>It {verb} {escape(in_ms(abs(cost), 2))}.</b>"
-    state = "active" if effect.active else "not active"
+    state, reason = "active" if effect.active else "not active", escape(in_labels(effect.reason, ()))
     return (
         f'<div style="opacity: {opacity}; margin: -0.35rem 0.75rem 0.5rem; font-size: 0.75rem; line-height: 1.3;" '
-        f'data-effect="{escape(effect.name, quote=True)}">{mark} {state}{size}: {escape(effect.reason)}.{price}</div>'
+        f'data-effect="{escape(effect.name, quote=True)}">{mark} {state}{size}: {reason}.{price}</div>'
     )
 
 
@@ -203,8 +203,9 @@ def forces_list(prediction: Prediction) -> str:
     """Return the largest forces on the cable, with estimated errors: of grippers, table, obstacles and known forces."""
     given = [(f"u = {g.u:.2f} m", g.times, g.reaction, g.reaction_error) for g in prediction.grasps]
     for c in prediction.contacts:
-        given += [(c.name, c.times, c.force, c.force_error)] if c.force.any() else []
-        given += [(f"{c.name}, friction", c.times, c.friction, c.friction_error)] if c.friction.any() else []
+        name = _in_labels(c.name, prediction)
+        given += [(name, c.times, c.force, c.force_error)] if c.force.any() else []
+        given += [(f"{name}, friction", c.times, c.friction, c.friction_error)] if c.friction.any() else []
     for load in prediction.scene.loads:
         given.append((f"known force, u = {load.u:.2f} m", *forces_over(load, prediction.surface.horizon), None))
     rows = []

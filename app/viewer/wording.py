@@ -61,7 +61,8 @@ _BARE = {field.rpartition(".")[2]: name for field, name in _NAMES.items()}
 _BARE = {field: name for field, name in _BARE.items() if "_" in field and field not in name}  # others are plain words
 _PART = r"[a-z_]+(?:\[\d+\])*"
 _FIELD = re.compile(
-    rf"\b(?:(?:cable|environment|shape|quality|effects)(?:\.{_PART})+|(?:primitives|loads)\[\d+\](?:\.{_PART})*"
+    rf"\b(?:(?:cable|environment|shape|quality|effects)(?:\.{_PART})+"
+    rf"|(?:primitives|loads|obstacles)\[\d+\](?:\.{_PART})*"
     rf"|horizon(?=: got)|{'|'.join(sorted(_BARE, key=len, reverse=True))})"
     r"(?!\w)"
 )
@@ -96,7 +97,7 @@ def _label(field: str, places: Sequence[float]) -> str:
         return f"the effect {field.removeprefix('effects.').replace('_', ' ')}"
     key = re.sub(r"\[\d+\]", "[]", field)
     label = _NAMES.get(key, _NAMES.get(key.removesuffix("[]"), ""))
-    whose = re.match(r"(primitives|loads|environment\.obstacles)\[(\d+)\]\.?", field)
+    whose = re.match(r"(?:environment\.)?(primitives|loads|obstacles)\[(\d+)\]\.?", field)
     if whose is None:
         return label or _BARE.get(field, field)
     number, rest = int(whose[2]), field[whose.end() :]

@@ -1,6 +1,7 @@
 """Edits of a draft, without a service: clicks, rotations, new grippers and numbers on the panel."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from app.viewer.draft import Draft, start_draft
 from app.viewer.forms.cable import CUSTOM, CableForm, preset_of
 from app.viewer.palette import ramp
 from app.viewer.picking import NEAR_CABLE, CableClick, GripperClick, picked
-from dlocore import PRESETS, SceneError, predict
+from dlocore import PRESETS, EffectReport, SceneError, predict
 from dlocore.calibration import Measured
 
 CABLE = np.column_stack([np.linspace(0, 1, 121), np.zeros(121), np.zeros(121)])
@@ -192,3 +193,15 @@ def test_the_largest_forces_have_their_errors_and_the_table_is_among_them():
     assert f"u = {grasp.u:.2f} m: at most {np.linalg.norm(grasp.reaction[k]):.2g}" in text
     assert f" ± {grasp.reaction_error[k]:.1g} N, at {grasp.times[k]:.2f} s" in text
     assert f"table: at most {table.pressed[0]:.2g}" in text
+
+
+def test_forces_and_reasons_name_an_obstacle_as_the_panel_does():
+    prediction = predict(start_draft().scene(NOTHING_STORED))
+    (table,) = prediction.contacts
+    peg = replace(table, name="obstacles[0]", friction=table.force)
+    text = report.forces_list(replace(prediction, report_contacts=lambda: (table, peg)))
+    assert "table: at most" in text
+    assert "obstacle 1: at most" in text
+    assert "obstacle 1, friction: at most" in text
+    effect = EffectReport("table", True, "obstacles[1] has no upright walls where the cable lies")
+    assert "active: obstacle 2 has no upright walls where the cable lies." in report.effect_note(effect, None)

@@ -24,6 +24,11 @@ PLACES = [0.25, 1.0]
         ("primitives[0].path.times[4] is 0.1 s after", "path.times[4] of gripper 1 at 0.25 m is 0.1 s after"),
         ("the path of primitives[7] swings", "the path of gripper 8 swings"),
         ("environment.obstacles[2].radius: got 0.0", "Radius of obstacle 3: got 0.0"),
+        (
+            "It takes the cable 0.0125 m into obstacles[0] at 1.16 s",
+            "It takes the cable 0.0125 m into obstacle 1 at 1.16 s",
+        ),
+        ("obstacles[1] begins 2 mm above the table", "obstacle 2 begins 2 mm above the table"),
         ("loads[0].force.times: got [0.499, 0.5, 0.299, 0.3]", "Until of force 1: got [0.499, 0.5, 0.299, 0.3]"),
         ("loads[1].u: got 2.0", "Acts at u of force 2: got 2.0"),
         ("environment.table.height: got inf", "Table height: got inf"),
