@@ -1,5 +1,7 @@
 """The number fields of the panel: a typed number is solved, or reported as not allowed."""
 
+import json
+
 import pytest
 from protocol_client import SceneClient, connected
 
@@ -27,7 +29,7 @@ def test_a_number_is_written_short_and_read_again(number, text):
     assert read(text) == pytest.approx(number, rel=1e-7)
 
 
-LABEL = "EI [10⁻³ N m²]"
+LABEL, DURATION = "EI [10⁻³ N m²]", "Duration [s]"
 
 
 def typed(client: SceneClient, text: str) -> None:
@@ -65,13 +67,30 @@ def test_the_beginning_of_a_number_is_waited_for(service):
         client.wait_for(lambda: client.notifications == [f"{LABEL} is left at 0.1"])
 
 
-@pytest.mark.parametrize("label", ["Duration [s]", "Grasp u [m]"])
-def test_a_slider_beside_which_nothing_of_its_range_is_typed_yet_changes_nothing(service, label):
+def test_a_slider_beside_which_nothing_of_its_range_is_typed_yet_changes_nothing(service):
     with connected(service) as client:
         before = client.document
         for beyond in (-1.0, 20.0):
-            client.set(label, beyond)
+            client.set("Grasp u [m]", beyond)
             assert client.document == before
+
+
+def test_a_move_lasts_as_long_as_is_typed_and_another_duration_is_told(service):
+    with connected(service) as client:
+        before = client.document
+        for text in ("0", "-1", "abc", "1e5"):
+            client.set(DURATION, text)
+            assert client.document == before
+            assert client.notifications.pop() == f"{DURATION} is left at 1.6"
+            assert client.notices.pop() == f"Got {text}, allowed: a number from 0.001 to 10000."
+        client.set(DURATION, "25")
+        assert client.document["primitives"][0]["path"]["duration"] == 25.0
+        client.set("Changes", "Undo")
+        client.wait_for(lambda: client.control(DURATION)[1]["value"] == "1.6")
+        assert client.document == before
+        before["primitives"][0]["path"]["duration"] = 0.05
+        client.upload("Open a file …", "scene.json", json.dumps(before).encode())
+        client.wait_for(lambda: client.control(DURATION)[1]["value"] == "0.05")
 
 
 def test_a_target_error_is_at_most_as_long_as_the_cable_in_millimetres(service):

@@ -52,7 +52,7 @@ class GripperForm(Form):
         )
         self._turn = gui.add_vector3("Turn [°]", (0.0, 0.0, 0.0), step=5.0, hint="Rotation vector, in the world's axes")
         self._in_space = gui.add_checkbox("Drag in height too", initial_value=False)
-        self._duration = gui.add_slider("Duration [s]", min=0.1, max=10.0, step=0.05, initial_value=1.0)
+        self._duration = NumberField(gui, "Duration [s]", 1.0, low=0.001, high=1e4)
         self._moves = gui.add_button_group(
             "Moves",
             (ANOTHER, LAST),
@@ -77,7 +77,7 @@ class GripperForm(Form):
         self._bind(self._target, lambda d: grips.with_target(d, self._begin(d), np.array(self._target.value)))
         self._bind(self._turn, lambda d: grips.with_turn(d, np.radians(self._turn.value)))
         self._bind(self._in_space, lambda d: replace(d, in_space=self._in_space.value))
-        self._bind(self._duration, lambda d: grips.with_duration(d, float(self._duration.value)))
+        self._bind(self._duration, lambda d: grips.with_duration(d, self._duration.value))
         self._on_click(self._moves, self._with_moves)
         self._bind(self._profile, lambda d: grips.path_changed(d, "profile", self._profile.value))
         self._bind(self._closes, lambda d: grips.changed(d, "grasp_time", self._closes.value or None))
@@ -151,10 +151,7 @@ class GripperForm(Form):
         show_value(self._target, tuple(round(float(x), 4) for x in grips.target(draft, self._begin(draft))))
         show_value(self._turn, tuple(round(float(x), 2) for x in np.degrees(grips.turn(draft))))
         show_value(self._in_space, draft.in_space)
-        duration = grips.duration(draft)
-        if duration > self._duration.max:
-            self._duration.max = duration
-        show_value(self._duration, duration)
+        show_value(self._duration, grips.duration(draft))
         show_value(self._profile, held["path"].get("profile", "minimum_jerk"))
         show_value(self._closes, float(held.get("grasp_time") or 0.0))
         show_value(self._opens, float(held.get("release_time") or 0.0))
