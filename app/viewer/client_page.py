@@ -27,6 +27,27 @@ _NEGATIVE_NUMBERS = r"""<script>
 }
 </script>
 """
+# In vector fields and beside sliders, the client drops the "e" of 1e-1 and moves the "-" to the front: it reads -11. So
+# this script rejects the "e" and all that follows, until the user deletes something, replaces all or leaves the field.
+PLAIN_NUMBERS = "Write 0.1, not 1e-1, in this field. What you typed from the e on is left out."
+_POWERS_OF_TEN = f"""<script>
+{{
+  let refused = false;
+  const refuse = (field, words) => {{ refused = words !== ""; field.setCustomValidity(words); }};
+  addEventListener("beforeinput", (event) => {{
+    const {{ target, data }} = event;
+    if (target.inputMode !== "decimal") return;
+    const whole = target.selectionStart === 0 && target.selectionEnd === target.value.length;
+    if (data === null || whole) refuse(target, "");
+    if (/e/i.test(data ?? "")) refuse(target, {PLAIN_NUMBERS!r});
+    if (!refused) return;
+    event.preventDefault();
+    target.reportValidity();
+  }}, true);
+  addEventListener("focusout", ({{ target }}) => {{ if (refused) refuse(target, ""); }}, true);
+}}
+</script>
+"""
 # Without a connection, the client freezes and dims the panel: each part of it, nested parts too. It does the same while
 # the page loads, so the message appears only after a second.
 _FROZEN = 'div[style*="opacity: 0.5"][style*="pointer-events: none"]'
@@ -64,4 +85,4 @@ _STYLE = f"""<style>
 def client_page() -> bytes:
     """Return the page of the scene as HTML."""
     page = _PAGE.read_text(encoding="utf-8").replace("<title>Viser</title>", f"<title>{TITLE}</title>")
-    return page.replace("</head>", f"{_NEGATIVE_NUMBERS}{_STYLE}</head>").encode()
+    return page.replace("</head>", f"{_NEGATIVE_NUMBERS}{_POWERS_OF_TEN}{_STYLE}</head>").encode()

@@ -7,6 +7,8 @@ from playwright.sync_api import Page, expect
 from test_browser import open_scene
 from test_scene import downloaded
 
+from app.viewer.client_page import PLAIN_NUMBERS
+
 pytestmark = pytest.mark.browser
 BETWEEN_KEYS = 150  # ms: like a person, so that the field is redrawn between two keys
 
@@ -53,4 +55,20 @@ def test_a_power_of_ten_is_typed_and_what_is_out_of_range_is_told(service, witne
     stiffness.fill("1e20")  # pasted, because slow typing would also enter the numbers 1 and 1e2
     expect(page.get_by_text("Got 1e20, allowed: a number from 1e-6 to 1e9.")).to_be_visible()
     expect(stiffness).to_have_value("0.1")
+    assert witness.errors == []
+
+
+def test_a_power_of_ten_in_a_vector_is_refused_from_its_e_on(service, witness):
+    page = open_scene(witness, service)
+    target = typed(page, "Target [m]", 1, "0.25e-1")
+    expect(target).to_have_value("0.25")
+    assert target.evaluate("field => field.validationMessage") == PLAIN_NUMBERS
+    target.press("Backspace")
+    target.press_sequentially("1", delay=BETWEEN_KEYS)
+    expect(target).to_have_value("0.21")
+    assert target.evaluate("field => field.validationMessage") == ""
+    assert solved_target(page) == [0.0, 0.21, 0.0]
+    typed(page, "Target [m]", 1, "0.3E")
+    target = typed(page, "Target [m]", 1, "-0.4")
+    expect(target).to_have_value("-0.4")
     assert witness.errors == []
