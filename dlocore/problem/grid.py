@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dlocore.kernels.assembly import History, slopes
 from dlocore.kernels.basis import Tables, basis_rows
+from dlocore.kernels.tension import COLUMNS
 from dlocore.pickling import Known, state_with
 
 Floats = NDArray[np.float64]
@@ -74,6 +75,10 @@ class Grid:
         past = History(*(x.copy() for x in self.history))
         past.pressing[:] = self.tables.contact.w
         return past
+
+    def untensed(self) -> Floats:
+        """Return a `History.tension` that is not known yet: the first tangent then takes the tension of the strain."""
+        return np.full((len(self.tables.axial.w), COLUMNS), np.nan)
 
     @property
     def n_u(self) -> int:

@@ -21,7 +21,6 @@ from dlocore.kernels.march import (
     STRUCK,
     march_steps,
 )
-from dlocore.kernels.tension import COLUMNS
 from dlocore.kernels.twisted_rows import PAST
 from dlocore.pickling import state_with
 from dlocore.problem.discretisation import applied_forces, applied_in_steps
@@ -263,7 +262,7 @@ class _Walk:
         self._info[FAILED_STEP] = -1
         self._starts: Starts = {}
         self._forces: list[WindowForces] = []
-        self._history = grid.past()._replace(tension=np.full((len(grid.tables.axial.w), COLUMNS), np.nan))
+        self._history = grid.past()._replace(tension=grid.untensed())
         if len(self._kept.log):
             note(problem.axes, self._history, self._kept.log[0])
         self._reached, self._split, self._strain = 0, 0, 0.0

@@ -8,7 +8,6 @@ from dlocore.effects.contact import DEEPEST
 from dlocore.kernels.assembly import History
 from dlocore.kernels.march import DEEPEST as DEEPEST_PLACE
 from dlocore.kernels.march import FAILED_STEP, march_steps
-from dlocore.kernels.tension import COLUMNS
 from dlocore.problem.discretisation import applied_at_rest
 from dlocore.problem.events import closed_grasps
 from dlocore.problem.grid import Grid
@@ -57,7 +56,7 @@ def _slid(problem: Problem, grid: Grid, monitor: Monitor) -> tuple[Floats, Rest,
     active, parameters = firmer(problem, 0.0).law_table()
     active[list(_RATES)] = 0
     axes, tables, length = problem.axes, grid.tables, cable.length
-    history = grid.past()._replace(tension=np.full((len(tables.axial.w), COLUMNS), np.nan))
+    history = grid.past()._replace(tension=grid.untensed())
     starts: Starts = {}
     grasps = closed_grasps(problem.scene, 0.0, 0.0)
     close_grasps(problem, grid, grasps, starts, None)

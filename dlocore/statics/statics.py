@@ -15,7 +15,6 @@ from dlocore.compiling.interrupts import interruptible
 from dlocore.effects.contact import DEEPEST
 from dlocore.errors import SceneError, number, whole
 from dlocore.kernels.assembly import History, slopes
-from dlocore.kernels.tension import COLUMNS
 from dlocore.problem.buckling import UNSTABLE, side_notes
 from dlocore.problem.checks import TOO_DEEP
 from dlocore.problem.discretisation import make_grid, smallest_n_u
@@ -265,7 +264,7 @@ def _without_bow(rest: _Rest, at: float, target: float, monitor: Monitor) -> _Re
         history = History(*(x.copy() for x in settled.history))
         history.memory[:] = 0.0  # a cable that is given a bow is straight when stress-free
         # the first tangent takes the tension of the strain: without it a cable that is twisted would have none
-        history = history._replace(tension=np.full((len(grid.tables.axial.w), COLUMNS), np.nan))
+        history = history._replace(tension=grid.untensed())
         straight = settle(settled.problem, grid, at, monitor, (settled.q.copy(), history), settled.starts)
         if straight.rest != "settled":
             return rest
