@@ -21,6 +21,11 @@ def in_newtons(force: float, digits: int = 2) -> str:
     return f"{_short(force, digits)} N"
 
 
+def in_m_per_s2(acceleration: float, digits: int = 2) -> str:
+    """Return an acceleration [m/s^2] with `digits` significant digits, or whole if large: 180 m/s^2."""
+    return f"{_short(acceleration, digits)} m/s^2"
+
+
 def counted(count: int, what: str) -> str:
     """Return a count with its noun, given in the singular: 1 iteration, 2 iterations."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -10,7 +10,7 @@ from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.paths import Move, Waypoints
 from dlocore.scene.scene import AUTO_TARGET, ControlPoints, Grasp, Scene, Straight
 from dlocore.shape.shape import StartCurve, start_curve
-from dlocore.words import in_mm
+from dlocore.words import in_m_per_s2, in_mm
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +30,11 @@ CLOSE = 0.1  # of the median time between waypoints: in less time noise may thro
 THROWN = 1e-3  # ... it does so by more than this part of the length, ...
 _MORE = 5.0  # ... and by more than this times the distance of the close waypoints from a path without them, ...
 _NEAR = 1e-2  # ... which is less than THROWN, or than this part of the extent of the waypoints: a late time stamp
+SCATTERED = 1 / 3  # of how far waypoints are from a cubic through neighbours twice as far: more is noise. A note if ...
+SHAKEN = 20.0  # [m/s^2] ... the path is accelerated by more (r.m.s.), or waypoints scatter by more than THROWN
+_EXACT = 1e-6  # of the length: waypoints that scatter by less are exact
+_FEW = 12  # waypoints in motion: fewer show no noise
+_MOVES = 0.1  # of the mean way between waypoints: less is no motion
 _BETWEEN = 8  # places between each two waypoints at which a path is evaluated
 _PLACES = 65  # of a start at which it is evaluated
 
@@ -43,6 +48,7 @@ def scene_notes(scene: Scene) -> list[str]:
         *_of_turns(scene),
         *_of_overshoots(scene),
         *_of_close_times(scene),
+        *_of_scatter(scene),
         *_of_conventions(scene),
     ]
 
@@ -266,6 +272,54 @@ def _of_close_times(scene: Scene) -> list[str]:
                 f"{grasp.start + t[k]:.4g} s. Leave this waypoint out"
             )
     return notes
+
+
+def _of_scatter(scene: Scene) -> list[str]:
+    """Return notes on paths that noise of the waypoints, or of their times, shakes.
+
+    A waypoint of a smooth path is much nearer to the cubic through its neighbours than to that through every other one;
+    noise is as far from both.
+    """
+    notes = []
+    for i, grasp in enumerate(scene.grasps):
+        path = grasp.path
+        if not isinstance(path, Waypoints) or path.profile != "spline":
+            continue
+        times, given = cast(Floats, path.times), cast(Floats, path.positions)
+        near, far = _scatter(times, given, 1), _scatter(times, given, 2)
+        if len(far) < _FEW:
+            continue
+        typical, length = float(np.median(near)), scene.cable.length
+        if not typical > max(SCATTERED * float(np.median(far)), _EXACT * length):
+            continue
+        shaken = _root_mean_square(times, path.acceleration(times))
+        if shaken > SHAKEN or typical > THROWN * length:
+            notes.append(
+                f"the waypoints of primitives[{i}] scatter about a smooth path, by some {in_mm(typical, 1)} and at "
+                f"most {in_mm(near.max())}. The gripper passes through all of them, with accelerations of "
+                f"{in_m_per_s2(shaken)} (r.m.s.), which the forces show. If this is noise of a log, or of its times, "
+                "smooth its positions first"
+            )
+    return notes
+
+
+def _scatter(times: Floats, given: Floats, stride: int) -> Floats:
+    """Return how far moving waypoints are (k,) [m] from the cubic through two on either side, `stride` apart."""
+    k = np.arange(2 * stride, len(times) - 2 * stride)
+    way = np.linalg.norm(given[k + stride] - given[k - stride], axis=1)
+    k = k[way > _MOVES * way.mean()] if way.any() else k[:0]
+    around = [k + a * stride for a in (-2, -1, 1, 2)]
+    through = np.zeros((len(k), 3))
+    for a in around:
+        share = np.prod([(times[k] - times[b]) / (times[a] - times[b]) for b in around if b is not a], axis=0)
+        through += share[:, None] * given[a]
+    return np.asarray(np.linalg.norm(given[k] - through, axis=1))
+
+
+def _root_mean_square(times: Floats, x: Floats) -> float:
+    """Return the r.m.s. size of what is linear between its values x (n, 3) at times (n,)."""
+    a, b = x[:-1], x[1:]
+    return math.sqrt(np.diff(times) @ (a * a + a * b + b * b).sum(axis=1) / (3.0 * (times[-1] - times[0])))
 
 
 def _along(times: Floats) -> Floats:

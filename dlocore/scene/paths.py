@@ -244,6 +244,10 @@ class Waypoints(Checked):
         """Positions at times `t` (k,) [s]; (k, 3) [m]. `start` is not used: waypoints are absolute."""
         return self._spline(self._evenly(t))  # type: ignore[attr-defined]
 
+    def acceleration(self, t: Floats) -> Floats:
+        """Accelerations (k, 3) [m/s^2] at times `t` (k,) [s] of a path with profile "spline"."""
+        return np.asarray(self._spline(self._evenly(t), 2))  # type: ignore[attr-defined]
+
     def rotation_at(self, t: Floats) -> Floats | None:
         """Rotations since the grasp began at times `t`; (k, 3, 3), or None if it never turns."""
         return None if self._turns is None else self._turned(t).as_matrix()  # type: ignore[attr-defined]
