@@ -25,7 +25,7 @@ from dlocore.pickling import state_with
 from dlocore.scene.paths import Still
 from dlocore.scene.scene import MAX_STRAIN, ControlPoints, Scene
 from dlocore.spline import SplineSurface, greville, nearest_line
-from dlocore.words import in_mm, in_ms, in_newtons
+from dlocore.words import in_mm, in_ms, in_newtons, per_m
 
 if TYPE_CHECKING:
     from dlocore.levels.level import Level
@@ -93,7 +93,8 @@ class Prediction:
         """What else to know: about the scene as given, strains, instabilities, effects that were left out."""
         from dlocore.problem.notes import scene_notes  # imports the compiler, which making a scene does not need
 
-        return (*scene_notes(self.scene), *self._objections, *self._of_a_small_motion(), *self._of_unsure_forces())
+        told = [*scene_notes(self.scene), *self._objections, *self._of_a_small_motion()]
+        return (*told, *self._of_sharp_bends(), *self._of_unsure_forces())
 
     def _of_a_small_motion(self) -> list[str]:
         """Return a note if the error is small against the length of the cable, but not against its motion."""
@@ -106,6 +107,22 @@ class Prediction:
         return [
             f"the cable moves by only {in_mm(moved)}, and the estimated error is large compared with that: give a "
             "smaller target_error"
+        ]
+
+    def _of_sharp_bends(self) -> list[str]:
+        """Return a note if the cable bends beside a gripper more sharply than the surface shows."""
+        from dlocore.answer.sharp_bends import sharpest_hidden  # imports the compiler
+
+        if self.status != "converged" or self.level is None:
+            return []
+        bend = sharpest_hidden(self.level.problem, self.surface, self.grasps)
+        if bend is None:
+            return []
+        error = "" if bend.error is None else f", give or take {per_m(bend.error)},"
+        return [
+            f"the cable bends beside primitives[{bend.grasp}] more sharply than the surface shows: with "
+            f"{per_m(bend.by_moment)} by the gripper's moment{error} and {per_m(bend.shown)} on the surface. If you "
+            "need it, give a smaller target_error"
         ]
 
     def _of_unsure_forces(self) -> list[str]:

@@ -26,6 +26,11 @@ def in_m_per_s2(acceleration: float, digits: int = 2) -> str:
     return f"{_short(acceleration, digits)} m/s^2"
 
 
+def per_m(curvature: float, digits: int = 2) -> str:
+    """Return a curvature [1/m] with `digits` significant digits, or whole if large: 264 /m."""
+    return f"{_short(curvature, digits)} /m"
+
+
 def counted(count: int, what: str) -> str:
     """Return a count with its noun, given in the singular: 1 iteration, 2 iterations."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"

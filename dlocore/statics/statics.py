@@ -11,6 +11,7 @@ from dlocore.answer.frames import free_of_frames
 from dlocore.answer.parts import Status, with_notes
 from dlocore.answer.reactions import reactions
 from dlocore.answer.report import elastic_energy
+from dlocore.answer.sharp_bends import missing_moments
 from dlocore.compiling.interrupts import interruptible
 from dlocore.effects.contact import DEEPEST
 from dlocore.errors import SceneError, number, whole
@@ -33,7 +34,6 @@ from dlocore.stability.sideways import WITH_TWIST, is_unstable, lacks_twist, sol
 from dlocore.statics.regrid import begin_on, starts_folded
 from dlocore.statics.resting import slide_to_rest
 from dlocore.statics.settling import Settled, depth, holding, settle, settle_along
-from dlocore.statics.sharp_bends import missing_moments
 from dlocore.statics.tipping import tip_notes, tipped
 from dlocore.statics.yielding import yield_notes
 from dlocore.words import in_mm
