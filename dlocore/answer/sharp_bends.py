@@ -68,23 +68,25 @@ def sharpest_hidden(problem: Problem, surface: SplineSurface, grasps: tuple[Gras
     Each gripper is judged at the time of the largest curvature by its moment, without what bending damping may add.
     """
     found = []
-    stiffness, moments = _stiffness(problem), [grasp.moment for grasp in grasps]
+    cable, stiffness = problem.scene.cable, _stiffness(problem)
+    gentle = 1.0 / (GENTLE * cable.diameter)
     plastic = problem.choices["plasticity"].active
-    for i in [] if plastic else _bending(problem, surface.knots_u, moments):
-        grasp, shown = grasps[i], []
+    for i in [] if plastic else _bending(problem, surface.knots_u, [grasp.moment for grasp in grasps]):
+        grasp = grasps[i]
+        if np.linalg.norm(grasp.moment, axis=1).max() <= gentle * stiffness:
+            continue
         times = grasp.times.clip(0.0, surface.horizon)
-        ways = _INSTANT * surface.horizon * np.array([[-1.0], [0.0], [1.0]])
-        around = (times + ways).clip(0.0, surface.horizon)
-        for t in around:
-            by_moment, bends = _curvatures(problem, i, grasp.moment, partial(_derivative, surface, t))
-            shown.append(bends)
-        rates = np.linalg.norm(shown[2] - shown[0], axis=1) / (around[2] - around[0])
-        sizes = np.linalg.norm(by_moment, axis=1) - problem.scene.cable.bending_damping / stiffness * rates
+        by_moment, shown = _curvatures(problem, i, grasp.moment, partial(_derivative, surface, times))
+        sizes = np.linalg.norm(by_moment, axis=1)
+        if cable.bending_damping > 0.0:
+            around = (times + _INSTANT * surface.horizon * np.array([[-1.0], [1.0]])).clip(0.0, surface.horizon)
+            was, becomes = (_curvatures(problem, i, grasp.moment, partial(_derivative, surface, t))[1] for t in around)
+            rates = np.linalg.norm(becomes - was, axis=1) / (around[1] - around[0])
+            sizes -= cable.bending_damping / stiffness * rates
         k = int(np.argmax(sizes))
         error = None if grasp.moment_error is None else float(grasp.moment_error[k]) / stiffness
-        bend = HiddenBend(i, float(sizes[k]), error, float(np.linalg.norm(shown[1][k])))
-        sharp = bend.by_moment * GENTLE * problem.scene.cable.diameter > 1.0
-        if sharp and bend.shown < (1.0 - FALLS_SHORT) * bend.by_moment:
+        bend = HiddenBend(i, float(sizes[k]), error, float(np.linalg.norm(shown[k])))
+        if bend.by_moment > gentle and bend.shown < (1.0 - FALLS_SHORT) * bend.by_moment:
             found.append(bend)
     return max(found, key=lambda bend: bend.by_moment, default=None)
 
