@@ -220,7 +220,7 @@ def _memory(problem: Problem, grid: Grid, history: History) -> Floats:
         return history.memory
     if material is not None:
         remembered = _remembered(problem, grid, material, problem.start(0.0, 1)[0], problem.start.knots)
-        return remembered if _has_yielded(material) else _as_stressed(problem, grid, remembered)
+        return _as_stressed(problem, grid, material, remembered)
     if problem.rests_straight:
         return history.memory
     curve: SplineCurve = problem.start if isinstance(rest, str) else rest_curve(rest, problem.scene.cable.length)
@@ -243,13 +243,12 @@ def _untouched(problem: Problem, grid: Grid) -> Floats:
     return np.concatenate([own[:, : problem.line.nc], grid.start[:, problem.line.nc :]], axis=1)
 
 
-def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
+def _as_stressed(problem: Problem, grid: Grid, material: Material, remembered: Floats) -> Floats:
     """Return what the sections remember (points, 2 m), changed so that the start has the stress of the given one.
 
     On few control points the start can't bend as sharply as the given one. If that is stress-free, as at a corner, the
-    cable would spring. So the curvature that is missing in the start is also subtracted from the stress-free one.
-    Memory on the same knots is not changed; that of a cable that has yielded belongs to its sections and is not passed
-    here.
+    cable would spring; if it has yielded, it would yield anew with every other grid, and keep more. So the curvature
+    that is missing in the start is also subtracted from the stress-free one. Memory on the same knots is not changed.
     """
     curve = problem.start
     if not remembered.any() or np.array_equal(curve.knots, grid.knots):
@@ -259,7 +258,7 @@ def _as_stressed(problem: Problem, grid: Grid, remembered: Floats) -> Floats:
     tables = _tables_of(problem, knots)
     there = _section_bends(problem, knots, tables, problem.coordinates(curve.control_points, theta))
     here = _section_bends(problem, grid.knots, grid.tables, _untouched(problem, grid))
-    missed = here - _between(grid.tables.curvature.u, tables.curvature.u, there, knots)
+    missed = here - _handed_on(material, grid.tables.curvature.u, tables.curvature.u, there, knots)
     out, half, bends = remembered.copy(), remembered.shape[1] // 2, missed.shape[1]
     out[:, :bends] += missed
     out[:, half : half + bends] += missed
@@ -305,12 +304,8 @@ def _remembered(problem: Problem, grid: Grid, material: Material, tangent: Float
 
     `tangent` (3,) is that at u = 0, where the material's director lies; `knots` are those of the memory.
     """
-    u, places = grid.tables.curvature.u, cast(Floats, material.u)
     values = np.concatenate(_memories(material), axis=1)
-    if _has_yielded(material):
-        sections = np.column_stack([np.interp(u, places, row) for row in values.T])
-    else:
-        sections = _between(u, places, values, knots)
+    sections = _handed_on(material, grid.tables.curvature.u, cast(Floats, material.u), values, knots)
     return sections if problem.nc == 4 else _planar_memory(problem, sections, cast(Floats, material.director), tangent)
 
 
@@ -325,6 +320,18 @@ def _has_yielded(material: Material) -> bool:
     return bool(np.abs(memory - natural).max() > _ROUNDING * np.abs(memory).max())
 
 
+def _handed_on(material: Material, u: Floats, places: Floats, values: Floats, knots: Floats) -> Floats:
+    """Return values (k, m) at u (k,) from those at `places` (p, m): as `_between`, or linear if the cable has yielded.
+
+    Where it is about to yield, the strain between two places must not exceed that at both.
+    """
+    return _linear(u, places, values) if _has_yielded(material) else _between(u, places, values, knots)
+
+
+def _linear(u: Floats, places: Floats, values: Floats) -> Floats:
+    return np.column_stack([np.interp(u, places, row) for row in values.T])
+
+
 def _between(u: Floats, places: Floats, values: Floats, knots: Floats) -> Floats:
     """Return values (k, m) at u (k,), interpolated from those at `places` (p, m).
 
@@ -335,7 +342,7 @@ def _between(u: Floats, places: Floats, values: Floats, knots: Floats) -> Floats
     cuts = np.unique(knots)
     span = np.clip(np.searchsorted(cuts, places) - 1, 0, len(cuts) - 2)
     if not np.array_equal(span, np.repeat(np.arange(len(cuts) - 1), 3)):
-        return np.column_stack([np.interp(u, places, row) for row in values.T])
+        return _linear(u, places, values)
     at = np.clip(np.searchsorted(cuts, u, side="right") - 1, 0, len(cuts) - 2)
     x, y = places.reshape(-1, 3)[at], values.reshape(-1, 3, values.shape[1])[at]
     shares = [(u - x[:, j]) * (u - x[:, k]) / ((x[:, i] - x[:, j]) * (x[:, i] - x[:, k])) for i, j, k in _THREE]
