@@ -26,8 +26,8 @@ BEND = [
 CARRY = [{"u": 0.7, "hold": "point", "path": {"kind": "move", "displacement": [0.1, 0.1, 0], "duration": 1.5}}]
 
 
-def predicted(client: TestClient, **parts: Any) -> dict[str, Any]:
-    scene = paper_scene(environment={"drag": 0.2, "table": {}}, quality={"target_error": 0.005}, **parts)
+def predicted(client: TestClient, target: float = 0.005, **parts: Any) -> dict[str, Any]:
+    scene = paper_scene(environment={"drag": 0.2, "table": {}}, quality={"target_error": target}, **parts)
     response = client.post("/v1/predictions", json=scene)
     assert response.status_code == 201, response.text
     document: dict[str, Any] = response.json()
@@ -47,7 +47,7 @@ def bent_carried(client: TestClient, cable: dict[str, Any]) -> tuple[dict[str, A
     first = predicted(client, cable=cable, shape={"kind": "straight"}, primitives=BEND, horizon=6.0)
     assert max(abs(bend(first, k)) for k in range(33)) > 2.0  # rad: it was bent
     shape = {"kind": "prediction", "id": first["id"]}
-    return first, predicted(client, cable=cable, shape=shape, primitives=CARRY, horizon=3.0)
+    return first, predicted(client, target=0.001, cable=cable, shape=shape, primitives=CARRY, horizon=3.0)
 
 
 def test_a_cable_that_has_yielded_keeps_its_bend_from_run_to_run(client: TestClient) -> None:
@@ -55,10 +55,10 @@ def test_a_cable_that_has_yielded_keeps_its_bend_from_run_to_run(client: TestCli
     held, released = bend(first, 15), bend(first, -1)  # the last sample before the release, and the end
     assert released > held - 4.0 * 0.26  # rad: at most the curvature of yield springs back between the two places
     # the start is the end of the run before, seen through the grid of the new one: within the error asked for
-    np.testing.assert_allclose(second["surface"]["positions"][0], first["surface"]["positions"][-1], rtol=0, atol=5e-3)
+    np.testing.assert_allclose(second["surface"]["positions"][0], first["surface"]["positions"][-1], rtol=0, atol=1e-3)
     # carried by its other end it swings, but nothing bends it beyond yield again: the error asked for turns a tangent
-    # over 0.26 m by 0.02 rad at each end
-    assert bend(second, -1) == pytest.approx(released, abs=0.04)
+    # over 0.26 m by 0.004 rad at each end, and more beside a sharp bend
+    assert bend(second, -1) == pytest.approx(released, abs=0.02)
 
 
 def test_an_elastic_cable_comes_straight_again(client: TestClient) -> None:
