@@ -33,7 +33,7 @@ def stretch_of(
     sides = [np.nextafter(at, 0.0), at, np.nextafter(at, length)]
     u = np.unique(np.concatenate([[0.0], grid.tables.axial.u, *sides, [length]]))
     elastic = problem.stretch_memory is None and not np.any(grid.history.axial[:, 0])
-    ends = told_ends(scene) if elastic else []
+    ends = told_ends(scene, grid) if elastic else []
     at_points = axial_strain(grid.tables, states[kept][..., : problem.plane.dimensions])
     at_ends = [_pulled(problem, grid, times, states, grasps, end)[kept] for end in ends]
     known = np.column_stack([at_points, *at_ends])

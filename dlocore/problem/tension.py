@@ -6,8 +6,8 @@ It is the quadratic spline e on the knots of the grid with
 
 The b_i' are combinations of these phi_j, so that the forces on all control points are those of the e_p (docs/model.md,
 selective reduced integration). Two terms are added: a step where a force acts at a point, and a force on phi_j(u_g)
-where a direction is held with unit length. Their sizes are those that make e least curved, except that at an end whose
-direction is held e is determined by the force of its gripper.
+where a direction is held with unit length. Their sizes are those that make e least curved, except that e is determined
+by the force on an end whose direction is held, or beside which another force acts in a tip without a span of its own.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlocore.kernels.basis import GAUSS_3, gauss_points
+from dlocore.problem.features import SAME
 from dlocore.problem.grid import Grid
 from dlocore.scene.scene import Scene
 from dlocore.spline import DEGREE
@@ -25,10 +26,20 @@ Floats = NDArray[np.float64]
 _SAME = 1e-9  # of the largest singular value: smaller ones are the rounding between two equal sides of a place
 
 
-def told_ends(scene: Scene) -> list[float]:
-    """Return the ends [m] at which a held direction's gripper force gives the strain: those without a point mass."""
-    heavy = {mass.u for mass in scene.cable.point_masses}
-    return [u for u in (0.0, scene.cable.length) if u not in heavy and u in _held(scene)]
+def told_ends(scene: Scene, grid: Grid) -> list[float]:
+    """Return the ends [m] at which the force on them gives the strain: those without a point mass, if ...
+
+    - a direction is held there: the force of its gripper,
+    - or a force acts in a tip that has no span of its own: there the strain is that of a free end.
+    """
+    heavy, held, length = {mass.u for mass in scene.cable.point_masses}, _held(scene), scene.cable.length
+    beside = {0.0 if u < 0.5 * length else length for u in _in_tips(scene, grid) if u not in held}
+    return [u for u in (0.0, length) if u not in heavy and (u in held or u in beside)]
+
+
+def _in_tips(scene: Scene, grid: Grid) -> set[float]:
+    """Return the places [m] of a scene in tips that have no span of their own, so that no knot lies there."""
+    return {u for u in scene.places if np.abs(grid.knots - u).min() > SAME * scene.cable.length}
 
 
 def balanced(scene: Scene, grid: Grid, u: Floats, ends: Sequence[float] = ()) -> Floats:
@@ -37,11 +48,13 @@ def balanced(scene: Scene, grid: Grid, u: Floats, ends: Sequence[float] = ()) ->
     These are the strains at the axial points (p,) of a grid and at some of its `told_ends` (ends,) [m].
     """
     tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
-    points, weights = gauss_points(np.array(grid.knots), *GAUSS_3)
+    sides = _held_sides(scene)
+    tips = _in_tips(scene, grid)
+    inside = np.unique([u for u in scene.places if 0.0 < u < length and not (u in tips and u in _held(scene))])
+    # a place in a tip has no knot: the integral over its step has to stop there
+    points, weights = gauss_points(np.sort(np.concatenate([grid.knots, inside])), *GAUSS_3)
     over = _basis(knots, points)
     mass = over.T @ (weights[:, None] * over)
-    sides = _held_sides(scene)
-    inside = np.unique([u for u in scene.places if 0.0 < u < length])
 
     def steps(at: Floats) -> Floats:
         return np.heaviside(at[:, None] - inside, 0.5)

@@ -53,6 +53,29 @@ def test_the_tension_of_a_hanging_cable_is_the_weight_below(hold: str, grid: str
     np.testing.assert_allclose(found, G * (1.0 - u), atol=1e-6 * G)
 
 
+@pytest.mark.parametrize("tip", [1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("hold", ["point", "clamp"])
+def test_the_tension_is_told_where_a_gripper_holds_just_beside_an_end(hold: Any, tip: float) -> None:
+    """A tip of up to half a diameter has no span of its own, and no point at which the tension is known."""
+    u, found = tension(predict(replace(held(hold, "free"), grasps=[Grasp(u=tip, hold=hold)])), 1.0)
+    inside = u > tip
+    np.testing.assert_allclose(found[inside], G * (1.0 - u[inside]), atol=1.1 * tip * G)
+    assert np.abs(found).max() < 1.01 * G
+
+
+@pytest.mark.parametrize("u", [0.0005, 0.9995])
+def test_a_cable_that_was_held_just_beside_an_end_goes_on(u: float) -> None:
+    path = Move(displacement=(0.0, 0.2, 0.0), duration=1.0)
+    scene = Scene(cable=Cable.preset("paper"), shape=Straight(), grasps=[Grasp(u=u, path=path)])
+    prediction = predict(scene)
+    (size,) = (effect.magnitude for effect in prediction.effects if effect.name == "stretch")
+    assert size is not None
+    assert size < 3e-3
+    shape = prediction.shape_at()
+    assert np.abs(np.array(shape.strain)).max() < 3e-3
+    assert predict(replace(scene, shape=shape, grasps=[Grasp(u=u)], horizon=0.3)).status == "converged"
+
+
 @pytest.mark.parametrize("grid", GRIDS)
 @pytest.mark.parametrize("hold", ["point", "clamp"])
 def test_the_tension_of_a_cable_that_is_pulled_at_its_end_is_the_pull(hold: str, grid: str) -> None:
