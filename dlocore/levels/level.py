@@ -256,7 +256,7 @@ def run_level(
     if booked:
         monitor.phase("march")
     known = None if plain is None or motion is not plain[0] else (plain[1], plain[2])
-    knots_t, control, off = _splined(problem, motion, knots_t, known, free_knots)
+    knots_t, control, off = _splined(problem, motion, knots_t, known, free_knots, monitor, whole)
     if booked:
         monitor.phase("fit")
     worst = largest(motion.times, off, problem.scene.swing)
@@ -293,8 +293,9 @@ def _stiffened(
 
 
 def _splined(
-    problem: Problem, motion: March, knots_t: Floats, known: tuple[Floats, Floats] | None, free_knots: bool
-) -> tuple[Floats, Floats, Floats]:
+    problem: Problem, motion: March, knots_t: Floats, known: tuple[Floats, Floats] | None, free_knots: bool,
+    monitor: Monitor, whole: bool,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """Return time knots (n_t + 4,) [s] and control points (n_t, n_u, nc) [m] of a march, and their misfit [m].
 
     Args:
@@ -303,14 +304,16 @@ def _splined(
         knots_t: the knots to begin with.
         known: control points on these, and the misfit at each state (steps + 1,) [m], if they are known.
         free_knots: whether to add knots where the cable strikes something, or is fast within a long time.
+        monitor: of the solve.
+        whole: whether a spline that the deadline leaves with too few knots is of no use.
     """
     smooth = motion
     period = problem.scene.swing
     if free_knots and (problem.contact is not None or motion.deepest > 0.0):
-        knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter, True)
+        knots_t, smooth = refined(motion, knots_t, _MISSED * problem.scene.cable.diameter, True, monitor, whole)
     elif free_knots and problem.horizon > _LONG * period:
         target = problem.scene.quality.target_error or AUTO_TARGET * problem.scene.cable.length
-        knots_t, _ = refined(motion, knots_t, _FITTED * target, False)
+        knots_t, _ = refined(motion, knots_t, _FITTED * target, False, monitor, whole)
     if known is not None and len(knots_t) == len(known[0]) + 4:
         control, off = known
     else:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from dlocore.kernels.timefit import fit_missed, fitted
 from dlocore.solvers.march import March
+from dlocore.solvers.monitor import Monitor, TimeIsUp
 
 Floats = NDArray[np.float64]
 
@@ -20,14 +21,26 @@ _STATES = 2  # of the march in a span of the time spline, at least
 _QUIET = 1e-3  # of the largest misfit: what a span is assumed to miss at least, so that none grows without bounds
 
 
-def refined(motion: March, knots_t: Floats, tolerance: float, strikes: bool) -> tuple[Floats, March]:
+def refined(
+    motion: March, knots_t: Floats, tolerance: float, strikes: bool, monitor: Monitor, whole: bool = False
+) -> tuple[Floats, March]:
     """Return time knots, more where the time spline misses the motion by more than `tolerance` [m], and what to fit.
 
     If the cable `strikes` something its velocity jumps, and a spline without knots there continues into the obstacle,
     or swings past its states. States half-way through the steps are then added to the motion there, and knots beside
-    them.
+    them. With many states this takes seconds, so it ends at the deadline.
+
+    Raises:
+        Cancelled: the caller asked to stop.
+        TimeIsUp: the deadline passed, and a spline with fewer knots is of no use (`whole`).
     """
     for _ in range(_REFINEMENTS):
+        try:
+            monitor.check()
+        except TimeIsUp:
+            if whole:
+                raise
+            break
         control, off = fit(motion, knots_t)
         between = _halved(motion, knots_t, control, tolerance) if strikes else motion
         breaks = np.unique(knots_t)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from benchmarks.catalogue import catalogue
-from dlocore import Cable, Environment, Grasp, Move, Quality, Scene, Straight, Table, Waypoints, predict
+from dlocore import Cable, Cancelled, Environment, Grasp, Move, Quality, Scene, Straight, Table, Waypoints, predict
 from dlocore.problem.discretisation import make_grid
 from dlocore.problem.problem import pose
 from dlocore.problem.time_grid import time_knots
 from dlocore.solvers import timefit
 from dlocore.solvers.march import March, march
-from dlocore.solvers.monitor import Monitor
+from dlocore.solvers.monitor import Monitor, TimeIsUp
 from dlocore.solvers.timefit import fit, refined
 
 TOLERANCE = 1e-6  # [m]: so little that the motion needs more knots and, with them, states between its steps
@@ -36,7 +36,7 @@ def jerk() -> tuple[March, np.ndarray]:
 
 def test_knots_and_states_are_added_until_the_spline_follows_the_march() -> None:
     motion, knots_t = jerk()
-    more, dense = refined(motion, knots_t, TOLERANCE, True)
+    more, dense = refined(motion, knots_t, TOLERANCE, True, Monitor())
     assert len(more) > len(knots_t)
     assert len(dense.times) > len(motion.times)
     assert set(motion.times) <= set(dense.times)
@@ -46,9 +46,21 @@ def test_knots_and_states_are_added_until_the_spline_follows_the_march() -> None
 def test_no_states_are_added_to_so_many_that_they_fill_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     motion, knots_t = jerk()
     monkeypatch.setattr(timefit, "_MOST_NUMBERS", motion.states.size - 1)
-    more, same = refined(motion, knots_t, TOLERANCE, True)
+    more, same = refined(motion, knots_t, TOLERANCE, True, Monitor())
     assert same is motion
     assert len(more) > len(knots_t)
+
+
+def test_knots_are_added_until_the_deadline_and_not_beyond_it() -> None:
+    motion, knots_t = jerk()
+    late = Monitor(deadline=0.0)
+    kept, same = refined(motion, knots_t, TOLERANCE, True, late)
+    assert kept is knots_t
+    assert same is motion
+    with pytest.raises(TimeIsUp):
+        refined(motion, knots_t, TOLERANCE, True, late, whole=True)
+    with pytest.raises(Cancelled):
+        refined(motion, knots_t, TOLERANCE, True, Monitor(cancelled=lambda: True))
 
 
 def over_a_bar() -> Scene:
@@ -116,7 +128,7 @@ def test_time_knots_stay_even_where_waypoints_would_crowd_them(times: list[float
 
 def test_where_nothing_strikes_knots_are_added_and_no_states() -> None:
     motion, knots_t = jerk()
-    more, same = refined(motion, knots_t, 1e-4, False)
+    more, same = refined(motion, knots_t, 1e-4, False, Monitor())
     assert same is motion
     assert len(more) > len(knots_t)
     assert fit(motion, more)[1].max() < 0.1 * fit(motion, knots_t)[1].max()
