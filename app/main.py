@@ -51,7 +51,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         async with viewer.running(app, service), service.running():
             yield
 
-    app = FastAPIOffline(title="dlo", version=program_version(), description=_ABOUT, lifespan=lifespan, redoc_url=None)
+    app = FastAPIOffline(
+        title="dlo",
+        version=program_version(),
+        description=_ABOUT,
+        lifespan=lifespan,
+        redoc_url=None,
+        generate_unique_id_function=openapi.operation_id,
+    )
     app.state.settings = settings
     problems.install(app)
     openapi.install(app)

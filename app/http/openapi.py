@@ -3,6 +3,7 @@
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.routing import APIRoute
 from pydantic import BaseModel
 
 from app.http.problems import API
@@ -38,6 +39,11 @@ def install(app: FastAPI) -> None:
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]
+
+
+def operation_id(route: APIRoute) -> str:
+    """Return the id of an operation, after which generated clients call their function: its tags and its own name."""
+    return "_".join([*map(str, route.tags), route.name])
 
 
 def _schemas(model: type[BaseModel]) -> dict[str, Any]:

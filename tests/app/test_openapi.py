@@ -36,6 +36,14 @@ def test_openapi_has_each_constant_as_an_enum_too(client: TestClient) -> None:
     assert all(kind["enum"] == [kind["const"]] for kind in kinds if "const" in kind)
 
 
+def test_operations_have_short_ids_of_their_own_that_clients_name_functions_after() -> None:
+    paths = create_app().openapi()["paths"]
+    ids = [operation["operationId"] for path in paths.values() for operation in path.values()]
+    assert len(set(ids)) == len(ids)
+    assert {"predictions_predict", "predictions_batch", "scenes_explain", "studies_listed", "service_ready"} < set(ids)
+    assert not [id for id in ids if "_v1_" in id or "__" in id]
+
+
 def test_every_course_of_events_can_be_over() -> None:
     paths = create_app().openapi()["paths"]
     courses = [path["get"]["responses"] for address, path in paths.items() if address.endswith("/events")]
