@@ -1,23 +1,28 @@
 """Predictions that go on from others: by address, in batches, and where there is nothing to go on from."""
 
 import json
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.schemas import PredictionRequest, to_scene
 from app.service.jobs import Job, State
 from app.service.service import Service
 from app.store.recent import Recent, size_of
-from dlocore import Prediction, predict
+from dlocore import Prediction, predict, sensitivities
 from tests.app.conftest import paper_scene
 from tests.app.test_bad_requests import the_problem
+from tests.examples.test_api_guide import section
 from tests.solver.scenes import march
 from tests.solver.scenes import paper_scene as solver_scene
 
 TARGET = {"target_error": 0.001}
 KEPT = "On the grid of a motion"
 AFRESH = "Solved from the beginning"
+SERVED = "http://127.0.0.1:8000"
 
 
 def moved(by: float) -> dict[str, Any]:
@@ -45,6 +50,23 @@ def test_a_batch_goes_on_from_one(client: TestClient) -> None:
     lines = client.post("/v1/predictions:batch", json=body).text.splitlines()
     assert all(KEPT in json.loads(line)["result"]["message"] for line in lines)
     assert len(lines) == 2
+
+
+def test_the_guides_difference_of_two_motions_is_the_derivative(client: TestClient) -> None:
+    scene = {
+        "cable": {"preset": "paper"},
+        "shape": {"kind": "straight"},
+        "primitives": [{"u": 0.25, "path": {"kind": "move", "displacement": [0, 0.5, 0], "duration": 1.6}}],
+        "environment": {"drag": 0.05, "table": {}},
+    }
+    run = client.post("/v1/predictions?store=false", json=scene).json()
+    sent = SimpleNamespace(post=lambda url, json, timeout: client.post(url.removeprefix(SERVED), json=json))
+    names: dict[str, Any] = {"httpx": sent, "json": json, "np": np, "scene": scene, "run": run}
+    exec(section("Derivatives of a motion"), names)
+    known = predict(to_scene(PredictionRequest.model_validate(scene), lambda id: None))
+    u, t = (np.array(run["surface"][name]) for name in "ut")
+    exact = sensitivities(known, ["grasps[0].path.displacement[1]"])(u, t)[0]
+    assert np.abs(names["slope"] - exact).max() < 2e-6 * np.abs(exact).max()
 
 
 def test_what_is_forgotten_is_solved_from_the_beginning_and_says_so(client: TestClient) -> None:
