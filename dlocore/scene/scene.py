@@ -234,7 +234,7 @@ class Grasp:
         instance("path", self.path, Path, "Still, Move or Waypoints")
         if self.hold == "point" and (self.path.turn is None or any(self.path.turn[6:])):
             name = "path.rotation" if isinstance(self.path, Move) else "path.orientations"
-            raise SceneError(name, "a rotation", 'none with hold "point", or hold "tangent"')
+            raise SceneError(name, 'a rotation with hold "point"', 'no rotation, or hold "tangent" or "clamp"')
         for name in ("grasp_time", "release_time"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, number(name, getattr(self, name), at_least=0.0, at_most=1e4, unit="s"))

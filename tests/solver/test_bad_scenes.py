@@ -330,3 +330,10 @@ def test_a_number_may_be_an_array_of_one_without_dimensions() -> None:
         Grasp(u=np.array([0.25]))
     with pytest.raises(SceneError, match="u: got"):
         Grasp(u=np.array(True))
+
+
+def test_a_rotation_of_a_point_is_told_which_holds_may_turn() -> None:
+    with pytest.raises(SceneError) as refused:
+        Grasp(u=0.3, path=Move(displacement=(0, 0, 0), duration=1.0, rotation=(0, 0, 1)))
+    assert refused.value.given == 'a rotation with hold "point"'
+    assert refused.value.allowed == 'no rotation, or hold "tangent" or "clamp"'
