@@ -8,20 +8,24 @@ _PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 TITLE = "dlo scene"
 FOLD = "told"  # CSS class of texts that are folded to three lines until they are clicked
 GONE = "The service does not respond. This page reconnects as soon as it does."
-# The client ignores texts that Number.isFinite rejects, such as "-". But it accepts "-0" and redraws the field as 0
-# before the rest of -0.2 is typed. So this script rejects "-0" while it is being typed, and puts 0 when the user leaves
-# the field.
-_NEGATIVE_NUMBERS = r"""<script>
+# The client ignores texts that Number.isFinite rejects, such as "-". But it accepts "-0", "0." and "1.0", and redraws
+# them as 0, 0 and 1 before the rest of -0.2, 0.5 or 1.07 is typed, which then makes another number. So this script
+# rejects them while single keys are pressed, and puts the number when the user leaves the field.
+_BEGUN_NUMBERS = r"""<script>
 {
-  const begun = (field) => field.inputMode === "decimal" && /^-\.?0[.0]*$/.test(field.value);
+  const begun = (field) => field.inputMode === "decimal" && /^-\.?0+$|[0-9]\.$|\.[0-9]*0$/.test(field.value);
   const isFinite = Number.isFinite;
-  let typing = false;
-  Number.isFinite = (number) => isFinite(number) && !(typing && number === 0);
-  addEventListener("input", ({ target }) => { typing = begun(target); }, true);
-  addEventListener("input", () => { typing = false; });
+  let typed = NaN;
+  Number.isFinite = (number) => isFinite(number) && number !== typed;
+  addEventListener("input", ({ target, data, inputType }) => {
+    const key = data?.length === 1 || inputType?.startsWith("delete");
+    typed = key && begun(target) ? Number(target.value) : NaN;
+  }, true);
+  addEventListener("input", () => { typed = NaN; });
   addEventListener("focusout", ({ target }) => {
     if (!begun(target)) return;
-    target.setRangeText("0", 0, target.value.length);
+    const number = target.value.replace(/\.0*$|(\.[0-9]*[1-9])0+$/, "$1").replace(/^-?0*$/, "0");
+    target.setRangeText(number, 0, target.value.length);
     target.dispatchEvent(new InputEvent("input", { bubbles: true }));
   }, true);
 }
@@ -48,6 +52,18 @@ _POWERS_OF_TEN = f"""<script>
 }}
 </script>
 """
+# When the user leaves the field beside a slider, the client silently changes a number beyond an end to that end. This
+# script keeps the number, so that the panel can say what is allowed.
+_BEYOND_SLIDERS = """<script>
+addEventListener("focusout", (event) => {
+  const { target } = event;
+  if (target.inputMode !== "decimal") return;
+  const slider = target.closest(".mantine-NumberInput-root")?.parentElement.querySelector(":scope > * [role=slider]");
+  const beyond = slider && (Number(target.value) < slider.ariaValueMin || Number(target.value) > slider.ariaValueMax);
+  if (beyond) event.stopPropagation();
+}, true);
+</script>
+"""
 # Without a connection, the client freezes and dims the panel: each part of it, nested parts too. It does the same while
 # the page loads, so the message appears only after a second.
 _FROZEN = 'div[style*="opacity: 0.5"][style*="pointer-events: none"]'
@@ -67,7 +83,10 @@ _STYLE = f"""<style>
   font-weight: 700;
   animation: told 0.2s 1s both;
 }}
-@keyframes told {{ from {{ opacity: 0; }} }}
+.mantine-NumberInput-input[style*="padding-right: 1.75em"] {{
+  padding-inline: 0.25em 1.4em !important;
+  letter-spacing: -0.5px;
+}}
 .{FOLD} > summary {{ list-style: none; cursor: pointer; }}
 .{FOLD} > summary::after {{ content: "more"; text-decoration: underline; }}
 .{FOLD}[open] > summary::after {{ content: "less"; }}
@@ -85,4 +104,4 @@ _STYLE = f"""<style>
 def client_page() -> bytes:
     """Return the page of the scene as HTML."""
     page = _PAGE.read_text(encoding="utf-8").replace("<title>Viser</title>", f"<title>{TITLE}</title>")
-    return page.replace("</head>", f"{_NEGATIVE_NUMBERS}{_POWERS_OF_TEN}{_STYLE}</head>").encode()
+    return page.replace("</head>", f"{_BEGUN_NUMBERS}{_POWERS_OF_TEN}{_BEYOND_SLIDERS}{_STYLE}</head>").encode()

@@ -4,10 +4,10 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from viser import GuiTextHandle, GuiVector3Handle
+from viser import GuiSliderHandle, GuiTextHandle, GuiVector3Handle
 
 from app.viewer.draft import Draft
-from app.viewer.number_field import NumberField, written
+from app.viewer.number_field import NumberField, refused, written
 
 REST = 0.4  # s without a keystroke after which a number counts as typed
 UNCLEAR = 1.6  # further s after which an invalid number no longer counts as the beginning of a valid one
@@ -24,15 +24,21 @@ class Edits:
 
     Args:
         draft: returns the draft.
-        take: takes over an edited draft, and shows it in all controls.
+        take: takes over an edited draft, and shows it in all controls if it is another one.
+        show: shows the draft in all controls.
         tell: shows a notification with this title and text.
     """
 
     def __init__(
-        self, draft: Callable[[], Draft], take: Callable[[Draft], None], tell: Callable[[str, str], object]
+        self,
+        draft: Callable[[], Draft],
+        take: Callable[[Draft], None],
+        show: Callable[[], None],
+        tell: Callable[[str, str], object],
     ) -> None:
         self._draft = draft
         self._take = take
+        self._show = show
         self._tell = tell
         self._loop = asyncio.get_running_loop()
         self._typed: list[tuple[Any, Change]] = []  # controls with typed values, and their changes
@@ -40,7 +46,7 @@ class Edits:
 
     def by(self, control: Any, change: Change) -> None:
         """Make the change of a control: at once, or when the typing in it pauses."""
-        if isinstance(control, TYPED):
+        if isinstance(control, TYPED) or _beyond(control):
             if not any(control is other for other, _ in self._typed):
                 self._typed.append((control, change))
             self.go_on()
@@ -55,30 +61,28 @@ class Edits:
 
     def _rest(self) -> None:
         """Take over typed values, unless one may be the beginning of a number."""
-        if any(isinstance(control, NumberField) and control.unclear for control, _ in self._typed):
+        if any(_unclear(control) for control, _ in self._typed):
             self._timer = self._loop.call_later(UNCLEAR, self.finish)
         else:
             self.finish()
 
     def make(self, change: Change) -> None:
-        """Make a change at once, after those of values typed before it.
+        """Make a change at once, after those of values typed before it; notify the user of those that are not allowed.
 
         All changes are made before the draft is shown again, because they read the controls, and showing the draft
         overwrites those.
         """
-        changes = [one for control, one in self._typed if self._settled(control)]
+        typed = [(control, one, _settle(control)) for control, one in self._typed]
         self.close()
         draft = self._draft()
-        for one in (*changes, change):
+        for one in (*(one for _, one, words in typed if not words), change):
             draft = one(draft)
         self._take(draft)
-
-    def _settled(self, control: Any) -> bool:
-        """Return whether the typed value of a control can be taken over; notify the user if not."""
-        words = control.settle() if isinstance(control, NumberField) else ""
-        if words:
-            self._tell(f"{control.label} is left at {written(control.value)}", words)
-        return not words
+        if any(words for _, _, words in typed):
+            self._show()
+        for control, _, words in typed:
+            if words:
+                self._tell(f"{control.label} is left at {written(control.value)}", words)
 
     def finish(self) -> None:
         """Take over what has been typed so far."""
@@ -94,3 +98,20 @@ class Edits:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+
+def _unclear(control: Any) -> bool:
+    """Return whether what is typed in a control is not, or not yet, an allowed number."""
+    return control.unclear if isinstance(control, NumberField) else _beyond(control)
+
+
+def _settle(control: Any) -> str:
+    """Return "" if the typed value of a control can be taken over; otherwise what is allowed."""
+    if isinstance(control, NumberField):
+        return control.settle()
+    return refused(written(control.value), control.min, control.max) if _beyond(control) else ""
+
+
+def _beyond(control: Any) -> bool:
+    """Return whether the number next to a slider is out of its range, as 0 may be while 0.5 is typed."""
+    return isinstance(control, GuiSliderHandle) and not control.min <= control.value <= control.max

@@ -22,6 +22,11 @@ def written(value: float) -> str:
     return f"{mantissa}e{int(exponent)}" if e else mantissa
 
 
+def refused(given: str, low: float, high: float) -> str:
+    """Return what is allowed in place of what was given."""
+    return f"Got {given}, allowed: a number from {written(low)} to {written(high)}."
+
+
 class NumberField:
     """A text field that holds a number within a range.
 
@@ -79,7 +84,7 @@ class NumberField:
             return ""
         given = self._field.value.strip()[:MOST] or "nothing"
         self._field.value = written(self._value)
-        return f"Got {given}, allowed: a number from {written(self._low)} to {written(self.high)}."
+        return refused(given, self._low, self.high)
 
     @property
     def _typed(self) -> float | None:

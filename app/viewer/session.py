@@ -126,7 +126,7 @@ class Session:
         self._gizmo = Gizmo(client.scene, self._begin_drag, self._drag, self._end_drag)
         self._shape = ShapeEditor(client, self._shape_dragged)
         self._tell = partial(client.add_notification, auto_close_seconds=TO_READ)
-        self._edits = Edits(lambda: self._draft, self._edited, self._tell)
+        self._edits = Edits(lambda: self._draft, self._edited, lambda: self._panel.take_draft(self._draft), self._tell)
         # viser calls no on_update for "0.0" after "0", on the way to 0.02: the value is the same
         client._websock_connection.register_handler(GuiUpdateMessage, lambda *_: self._edits.go_on())
         limit_uploads(client, self._refuse_file)

@@ -72,3 +72,47 @@ def test_a_power_of_ten_in_a_vector_is_refused_from_its_e_on(service, witness):
     target = typed(page, "Target [m]", 1, "-0.4")
     expect(target).to_have_value("-0.4")
     assert witness.errors == []
+
+
+def test_what_is_deleted_from_a_number_leaves_the_rest_as_it_was_typed(service, witness):
+    page = open_scene(witness, service)
+    for text, digit, expected in (("0.2", "5", 0.5), ("1.05", "7", 1.07), ("-0.07", "3", -0.03)):
+        target = typed(page, "Target [m]", 1, text)
+        target.press("Backspace")
+        page.wait_for_timeout(BETWEEN_KEYS)
+        expect(target).to_have_value(text[:-1])
+        target.press(digit)
+        expect(target).to_have_value(f"{expected}")
+    assert solved_target(page) == [0.0, -0.03, 0.0]
+    target.press("End")
+    target.press("Backspace")
+    target.press("Tab")
+    expect(target).to_have_value("0")
+    assert solved_target(page) == [0.0, 0.0, 0.0]
+    target.fill("0.50")  # pasted
+    assert solved_target(page) == [0.0, 0.5, 0.0]
+    assert witness.errors == []
+
+
+def test_a_target_is_typed_to_a_tenth_of_a_millimetre(service, witness):
+    page = open_scene(witness, service)
+    target = typed(page, "Target [m]", 1, "-0.1234")
+    assert solved_target(page) == [0.0, -0.1234, 0.0]
+    assert target.evaluate("field => field.scrollWidth <= field.clientWidth")
+    assert witness.errors == []
+
+
+def test_a_number_beyond_the_end_of_a_slider_is_told_when_its_field_is_left(service, witness):
+    page = open_scene(witness, service)
+    place = page.get_by_text("Grasp u [m]", exact=True).locator("xpath=ancestor::*[.//input][1]")
+    field = place.locator("input[inputmode]")
+    for leave in ("Tab", None):
+        field.click()
+        field.press("Control+a")
+        field.press_sequentially("7", delay=BETWEEN_KEYS)
+        if leave is not None:
+            field.press(leave)
+        expect(page.get_by_text("Got 7, allowed: a number from 0 to 1.")).to_be_visible()
+        expect(field).to_have_value("0.25")
+        page.get_by_text("Grasp u [m] is left at 0.25").locator("xpath=following::button[1]").click()
+    assert witness.errors == []

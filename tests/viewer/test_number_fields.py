@@ -67,12 +67,16 @@ def test_the_beginning_of_a_number_is_waited_for(service):
         client.wait_for(lambda: client.notifications == [f"{LABEL} is left at 0.1"])
 
 
-def test_a_slider_beside_which_nothing_of_its_range_is_typed_yet_changes_nothing(service):
+def test_a_number_beside_a_slider_that_is_out_of_its_range_is_told_and_changes_nothing(service):
     with connected(service) as client:
         before = client.document
         for beyond in (-1.0, 20.0):
+            client.control("Grasp u [m]")[1]["value"] = beyond
             client.set("Grasp u [m]", beyond)
             assert client.document == before
+            client.wait_for(lambda: client.control("Grasp u [m]")[1]["value"] == 0.25)
+            assert client.notifications.pop() == "Grasp u [m] is left at 0.25"
+            assert client.notices.pop() == f"Got {beyond:g}, allowed: a number from 0 to 1."
 
 
 def test_a_move_lasts_as_long_as_is_typed_and_another_duration_is_told(service):

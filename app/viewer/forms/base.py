@@ -2,10 +2,20 @@
 
 from typing import Any
 
-from viser import GuiEvent, GuiSliderHandle
+from viser import GuiApi, GuiEvent, GuiVector3Handle
 
 from app.viewer.draft import Draft
 from app.viewer.edits import Change, Edits
+
+Vector = tuple[float, float, float]
+DECIMALS = 4  # digits after the point in vector fields, where viser accepts and shows only those of the step
+
+
+def add_vector(gui: GuiApi, label: str, value: Vector, *, step: float, **given: Any) -> GuiVector3Handle:
+    """Add a field of three numbers; `step` is what its arrows add, and the rest is given to viser."""
+    vector = gui.add_vector3(label, value, step=step, **given)
+    vector.precision = DECIMALS
+    return vector
 
 
 def show_value(control: Any, value: Any) -> None:
@@ -43,7 +53,7 @@ class Form:
     def _bind(self, control: Any, change: Change) -> None:
         @control.on_update
         async def _edited(event: GuiEvent[Any]) -> None:
-            if event.client is not None and not _beyond(control):
+            if event.client is not None:
                 self._edits.by(control, change)
 
     def _on_click(self, button: Any, change: Change) -> None:
@@ -51,8 +61,3 @@ class Form:
         async def _clicked(_event: GuiEvent[Any]) -> None:
             self._edits.finish()
             self._edits.make(change)
-
-
-def _beyond(control: Any) -> bool:
-    """Return whether the number next to a slider is out of its range, as 0 is while 0.5 is typed."""
-    return isinstance(control, GuiSliderHandle) and not control.min <= control.value <= control.max

@@ -10,7 +10,7 @@ from viser import GuiApi
 from app.viewer import grips, report
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_choice, show_content, show_if, show_value
+from app.viewer.forms.base import Form, add_vector, show_choice, show_content, show_if, show_value
 from app.viewer.number_field import NumberField
 from app.viewer.wording import gripper_name
 from dlocore import SplineSurface
@@ -47,10 +47,10 @@ class GripperForm(Form):
         )
         self._hold = gui.add_dropdown("Holds", tuple(HOLDS))
         self._motion = gui.add_dropdown("Motion", get_args(grips.Motion))
-        self._target = gui.add_vector3(
-            "Target [m]", (0.0, 0.0, 0.0), min=(-FARTHEST,) * 3, max=(FARTHEST,) * 3, step=0.01
+        self._target = add_vector(
+            gui, "Target [m]", (0.0, 0.0, 0.0), min=(-FARTHEST,) * 3, max=(FARTHEST,) * 3, step=0.01
         )
-        self._turn = gui.add_vector3("Turn [°]", (0.0, 0.0, 0.0), step=5.0, hint="Rotation vector, in the world's axes")
+        self._turn = add_vector(gui, "Turn [°]", (0.0, 0.0, 0.0), step=5.0, hint="Rotation vector, in the world's axes")
         self._in_space = gui.add_checkbox("Drag in height too", initial_value=False)
         self._duration = NumberField(gui, "Duration [s]", 1.0, low=0.001, high=1e4)
         self._moves = gui.add_button_group(

@@ -7,7 +7,7 @@ from viser import GuiApi, GuiEvent
 from app.viewer import load_edits
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_choice, show_if, show_value
+from app.viewer.forms.base import Form, add_vector, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
 from dlocore.scene.cable import MAX_LENGTH
 
@@ -25,7 +25,7 @@ class LoadsForm(Form):
             self._add = gui.add_button("Add a force", color="gray", hint="In addition to grippers and surroundings")
             self._which = gui.add_dropdown("Force", (NONE,))
             self._u = NumberField(gui, "Acts at u [m]", 0.0, low=0.0, high=MAX_LENGTH)
-            self._force = gui.add_vector3("Force [N]", (0.0, 0.0, 0.0), step=0.001)
+            self._force = add_vector(gui, "Force [N]", (0.0, 0.0, 0.0), step=0.001)
             self._start = NumberField(gui, "From [s]", 0.0, low=0.0, high=LATEST)
             self._end = NumberField(gui, "Until [s]", 0.0, low=0.0, high=LATEST, hint="0: to the end")
             self._over_time = gui.add_html(

@@ -8,7 +8,7 @@ from viser import GuiApi, GuiEvent
 from app.viewer import obstacle_edits
 from app.viewer.draft import Draft
 from app.viewer.edits import Edits
-from app.viewer.forms.base import Form, show_choice, show_if, show_value
+from app.viewer.forms.base import Form, add_vector, show_choice, show_if, show_value
 from app.viewer.number_field import NumberField
 
 NONE = "no obstacle"
@@ -31,13 +31,13 @@ class SurroundingsForm(Form):
             self._drag = NumberField(gui, "Drag [N s/m²]", 0.0, low=0.0, high=1e6)
             with gui.add_folder("More of the surroundings", expand_by_default=False):
                 self._quadratic = NumberField(gui, "Drag [N s²/m³]", 0.0, low=0.0, high=1e6)
-                self._gravity = gui.add_vector3("Gravity [m/s²]", (0.0, 0.0, -9.81), step=0.1)
+                self._gravity = add_vector(gui, "Gravity [m/s²]", (0.0, 0.0, -9.81), step=0.1)
         with gui.add_folder("Obstacles"):
             self._add = gui.add_button_group("Add", tuple(ADDED))
             self._which = gui.add_dropdown("Obstacle", (NONE,))
-            self._centre = gui.add_vector3("Centre [m]", (0.0, 0.0, 0.0), step=0.01)
+            self._centre = add_vector(gui, "Centre [m]", (0.0, 0.0, 0.0), step=0.01)
             self._radius = NumberField(gui, "Radius [mm]", 1.0, low=0.1, high=1e7)
-            self._size = gui.add_vector3("Size [mm]", (1.0, 1.0, 1.0), step=1.0)
+            self._size = add_vector(gui, "Size [mm]", (1.0, 1.0, 1.0), step=1.0)
             self._long = NumberField(gui, "Length [mm]", 1.0, low=0.1, high=1e7)
             self._rough = NumberField(gui, "Obstacle friction", 0.0, low=0.0, high=10.0)
             self._remove = gui.add_button("Remove obstacle", color="gray")
