@@ -64,6 +64,12 @@ addEventListener("focusout", (event) => {
 }, true);
 </script>
 """
+# A failure stays in view while the panel is scrolled. A part of the panel that hides what overflows it would hold it
+# back; it need only clip that.
+_HIDES = 'div:has(> div[style*="transition: opacity 150ms"])'
+_FAILURES = ", ".join(
+    f'[data-status="{status}"]' for status in ("impossible", "max_iterations", "stalled", "time_limit")
+)
 # Without a connection, the client freezes and dims the panel: each part of it, nested parts too. It does the same while
 # the page loads, so the message appears only after a second.
 _FROZEN = 'div[style*="opacity: 0.5"][style*="pointer-events: none"]'
@@ -83,6 +89,16 @@ _STYLE = f"""<style>
   font-weight: 700;
   animation: told 0.2s 1s both;
 }}
+{_HIDES} {{ overflow: clip !important; }}
+div:has(> :is({_FAILURES})) {{
+  position: sticky;
+  top: 0;
+  z-index: 8;
+  max-height: 40vh;
+  overflow-y: auto;
+  background: var(--mantine-color-body);
+}}
+@keyframes told {{ from {{ opacity: 0; }} }}
 .mantine-NumberInput-input[style*="padding-right: 1.75em"] {{
   padding-inline: 0.25em 1.4em !important;
   letter-spacing: -0.5px;

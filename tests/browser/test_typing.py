@@ -116,3 +116,14 @@ def test_a_number_beyond_the_end_of_a_slider_is_told_when_its_field_is_left(serv
         expect(field).to_have_value("0.25")
         page.get_by_text("Grasp u [m] is left at 0.25").locator("xpath=following::button[1]").click()
     assert witness.errors == []
+
+
+def test_what_is_not_possible_stays_in_view_when_the_panel_is_scrolled(service, witness):
+    page = open_scene(witness, service)
+    typed(page, "Target [m]", 1, "900")
+    told = page.locator("[data-status=impossible]")
+    told.hover()
+    page.mouse.wheel(0, 2000)
+    expect(page.get_by_role("button", name="Add a force")).to_be_in_viewport()
+    expect(told).to_be_in_viewport(ratio=1)
+    assert witness.errors == []
