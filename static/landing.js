@@ -5,12 +5,12 @@ import { offerCopies } from "./copy.js";
 import { showGallery } from "./gallery.js";
 import { showMeasurements } from "./measurements.js";
 import { followRuns } from "./runs.js";
-import { showScene, showTheme, whenReady } from "./stage.js";
+import { awaken, showScene, showTheme } from "./stage.js";
 
 offerThemes(document.getElementById("theme"), showTheme);
 offerCopies();
 showScene();
 await showGallery(); // first: it may name the scene to show
-whenReady();
+awaken();
 showMeasurements();
 followRuns();

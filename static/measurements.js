@@ -13,6 +13,7 @@ const table = document.getElementById("plot-table");
 const measuring = document.getElementById("measure");
 const [button, bar, said] = ["button", "progress", "span"].map((part) => measuring.querySelector(part));
 let points = [];
+let drawn = null; // the motions that the plot shows
 let plot = null;
 let pointed = -1;
 
@@ -89,7 +90,7 @@ function tellHow() {
 }
 
 async function load() {
-  const { value: dimensions } = figure.querySelector("input:checked");
+  const chosen = figure.querySelector("input:checked");
   try {
     const health = await (await fetch("/health")).json(); // a request for measurements that don't exist would log an error
     if (health.calibrated === false) {
@@ -97,13 +98,18 @@ async function load() {
       tellHow();
       return;
     }
-    const answer = await fetch(`${ADDRESS}?dimensions=${dimensions}`, { headers: { Accept: "application/json" } });
+    const answer = await fetch(`${ADDRESS}?dimensions=${chosen.value}`, { headers: { Accept: "application/json" } });
     if (!answer.ok && answer.status !== 404) throw new Error(answer.statusText);
     const found = await answer.json();
     measuring.hidden = !answer.ok && found.type !== NOT_YET;
-    if (answer.ok) present(found);
+    if (answer.ok) {
+      present(found);
+      drawn = chosen;
+    }
     tellHow();
   } catch {
+    if (drawn !== null) drawn.checked = true;
+    note.hidden = false;
     note.textContent = "The measurements can't be loaded right now.";
   }
 }

@@ -34,15 +34,16 @@ async function refresh() {
   if (document.hidden) return;
   try {
     const { predictions: runs } = await read("/v1/predictions?limit=8");
+    note.hidden = runs.length > 0;
+    note.textContent = "No runs yet. Keep one in the scene, or post a scene to the API.";
     const ids = runs.map((run) => run.id).join();
     if (ids === shown) return;
     shown = ids;
     box.hidden = runs.length === 0;
-    note.hidden = runs.length > 0;
-    note.textContent = "No runs yet. Keep one in the scene, or post a scene to the API.";
     box.querySelector("tbody").replaceChildren(...runs.map(row));
   } catch {
-    if (shown === null) note.textContent = "The list of runs can't be loaded right now.";
+    note.hidden = false;
+    note.textContent = shown ? "The service does not respond. These were the last runs." : "The list of runs can't be loaded right now.";
   }
 }
 

@@ -13,7 +13,8 @@ const waiting = document.getElementById("waiting");
 const full = document.getElementById("full");
 const note = document.getElementById("stage-note");
 let example = null;
-let awake = false;
+let awake = false; // whether the scene to show at first is known
+let waits = false; // for the service
 let dark = false; // the theme that the scene is shown in
 let touched = false; // whether the user has worked in the scene: loading it again would undo that
 
@@ -34,7 +35,7 @@ export function showScene(name = example) {
   example = name;
   dark = isDark();
   full.href = address();
-  if (awake) scene.contentWindow.location.replace(full.href); // a new src would add a step to the history of Back
+  if (awake) load();
 }
 
 /** Show the scene in the theme of the page, unless the user has worked in it. */
@@ -54,14 +55,22 @@ async function state() {
   }
 }
 
-/** Wait until the service can solve, with a message meanwhile; then show the scene. */
-export async function whenReady() {
+/** Load the scene as soon as the service can solve, with a message meanwhile. */
+async function load() {
+  if (waits) return; // it will load the scene that is chosen by then
+  waits = true;
   for (let now = await state(); now !== "ready"; now = await state()) {
     waiting.hidden = false;
     waiting.textContent = SAID[now];
     await new Promise((resolve) => { window.setTimeout(resolve, RETRY); });
   }
+  waits = false;
   waiting.hidden = true;
+  scene.contentWindow.location.replace(full.href); // a new src would add a step to the history of Back
+}
+
+/** Show the scene from now on. */
+export function awaken() {
   awake = true;
-  showScene();
+  load();
 }

@@ -175,6 +175,18 @@ def test_the_page_says_that_the_solver_is_compiled_and_comes_alive_by_itself(ser
     expect(page.locator("#waiting")).to_be_hidden()
 
 
+def test_a_scene_chosen_while_the_service_is_gone_is_shown_as_soon_as_it_is_back(service, witness):
+    page = open_page(witness, service)
+    wait_for_scene(page, "/scene/?example=paper-25")
+    page.route("**/ready", lambda route: route.abort())
+    page.get_by_role("link", name=examples()["two-grippers"].title).first.click()
+    expect(page.locator("#waiting")).to_contain_text("does not respond")
+    wait_for_scene(page, "/scene/?example=paper-25")
+    page.unroute("**/ready")
+    wait_for_scene(page, "/scene/?example=two-grippers")
+    expect(page.locator("#waiting")).to_be_hidden()
+
+
 # --- what accuracy costs ---
 
 
@@ -228,6 +240,21 @@ def test_the_plot_tells_motions_in_the_plane_from_those_in_space(service, witnes
     expect(page.locator("#plot .sign")).to_have_count(5)
     page.get_by_label("in space").check()
     expect(page.locator("#plot .sign")).to_have_count(3)
+
+
+def test_measurements_that_cannot_be_loaded_leave_the_choice_at_those_that_are_shown(service, witness):
+    page = witness.page
+    with_calibration(page)
+    page.route("**/v1/calibration?dimensions=3", lambda route: route.abort())
+    open_page(witness, service)
+    expect(page.locator("#plot .sign")).to_have_count(5)
+    page.get_by_label("in space").click()
+    expect(page.locator("#plot-note")).to_have_text("The measurements can't be loaded right now.")
+    expect(page.locator("#plot-note")).to_be_visible()
+    expect(page.get_by_label("in the plane")).to_be_checked()
+    page.unroute("**/v1/calibration?dimensions=3")
+    page.get_by_label("in space").check()
+    expect(page.locator("#plot-note")).to_be_hidden()
 
 
 def test_the_plot_shows_the_measurements_of_the_service_where_there_are_any(service, witness):
@@ -322,6 +349,18 @@ def test_a_new_run_appears_with_its_status_time_error_and_recording(service, wit
     assert scene_file.get_attribute("href") == run["links"]["scene"]
     opens = row.get_by_role("link", name="open in the scene of Seen on the page")
     assert opens.get_attribute("href") == f"/scene/?run={run['id']}"
+
+
+def test_the_list_of_runs_says_when_the_service_is_gone(service, witness):
+    page = open_page(witness, service)
+    note = page.locator("#runs-note")
+    httpx.post(f"{service.address}/v1/predictions", content=examples()["paper-25"].document, timeout=60)
+    expect(page.locator("#runs-table")).to_be_visible()
+    expect(note).to_be_hidden()
+    page.route("**/v1/predictions?*", lambda route: route.abort())
+    expect(note).to_have_text("The service does not respond. These were the last runs.")
+    page.unroute("**/v1/predictions?*")
+    expect(note).to_be_hidden()
 
 
 # --- for everyone ---
