@@ -59,6 +59,8 @@ _NAMES = {
 }
 _BARE = {field.rpartition(".")[2]: name for field, name in _NAMES.items()}
 _BARE = {field: name for field, name in _BARE.items() if "_" in field and field not in name}  # others are plain words
+_QUALITIES = ("target error", "time budget")  # choices on that tab, which have a field only if they are chosen
+_BARE |= {name.replace(" ", "_"): f"{name} on the tab Quality" for name in _QUALITIES}
 _PART = r"[a-z_]+(?:\[\d+\])*"
 _FIELD = re.compile(
     rf"\b(?:(?:cable|environment|shape|quality|effects)(?:\.{_PART})+"
