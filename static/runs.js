@@ -3,11 +3,15 @@
 import { make, read, withUnit } from "./dom.js";
 
 const PERIOD = 5000; // ms
+const PAGE = 8; // runs that are shown at first, and added at a time
 const STATUS = {
   converged: "converged", max_iterations: "not converged", stalled: "stalled", time_limit: "out of time",
 };
+const MOST = 1000; // that the service lists at once
 const note = document.getElementById("runs-note");
 const box = document.getElementById("runs-table");
+const older = document.getElementById("runs-older");
+let most = PAGE;
 let shown = null;
 
 function when(created) {
@@ -33,7 +37,8 @@ function row(run) {
 async function refresh() {
   if (document.hidden) return;
   try {
-    const { predictions: runs } = await read("/v1/predictions?limit=8");
+    const { predictions: runs, total } = await read(`/v1/predictions?limit=${most}`);
+    older.hidden = runs.length >= total || most >= MOST;
     note.hidden = runs.length > 0;
     note.textContent = "No runs yet. Keep one in the scene, or post a scene to the API.";
     const ids = runs.map((run) => run.id).join();
@@ -49,6 +54,10 @@ async function refresh() {
 
 export function followRuns() {
   refresh();
+  older.addEventListener("click", () => {
+    most = Math.min(most + PAGE, MOST);
+    refresh();
+  });
   window.setInterval(refresh, PERIOD);
   document.addEventListener("visibilitychange", refresh);
 }

@@ -363,6 +363,24 @@ def test_the_list_of_runs_says_when_the_service_is_gone(service, witness):
     expect(note).to_be_hidden()
 
 
+def test_older_runs_are_shown_on_demand(service, witness):
+    page = witness.page
+    run = {"name": "", "created": "2026-01-31T12:00:00Z", "status": "converged", "method": "march", "wall_time": 0.01}
+    run |= {"error_estimate": None, "links": dict.fromkeys(("self", "viewer", "scene"), "/")}
+
+    def answer(route: Route) -> None:
+        limit = int(route.request.url.rpartition("=")[2])
+        route.fulfill(json={"predictions": [{**run, "id": str(k)} for k in range(11)][:limit], "total": 11})
+
+    page.route("**/v1/predictions?*", answer)
+    open_page(witness, service)
+    rows, older = page.locator("#runs-table tbody tr"), page.get_by_role("button", name="Show older runs")
+    expect(rows).to_have_count(8)
+    older.click()
+    expect(rows).to_have_count(11)
+    expect(older).to_be_hidden()
+
+
 # --- for everyone ---
 
 
