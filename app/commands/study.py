@@ -151,10 +151,21 @@ def _switches(given: str) -> Mapping[str, Switch]:
 
 
 def _table(measured: Any) -> str:
-    lines = [f"{'scene':32} {'effects':10} {'method':10} {'grid':>9} {'time [ms]':>11} {'error [mm]':>11}  status"]
+    """Return the runs as a table, with thresholds where they differ and error estimates where there are any."""
+    thresholds = len({run.delta for run in measured.runs}) > 1
+    estimates = any(run.estimate is not None for run in measured.runs)
+    head = f"{'scene':32} {'effects':10} {'method':10} {'grid':>9}"
+    head += f" {'delta [m]':>9}" if thresholds else ""
+    head += f" {'time [ms]':>11} {'error [mm]':>11}"
+    head += f" {'estimate [mm]':>13}" if estimates else ""
+    lines = [f"{head}  status"]
     for run in measured.runs:
         grid = f"{run.n_u} x {run.n_t}"
-        times = f"{1e3 * run.wall_time:11.3g} {1e3 * run.error:11.3g}"
-        lines.append(f"{run.scene[:32]:32} {run.effects[:10]:10} {run.method:10} {grid:>9} {times}  {run.status}")
+        line = f"{run.scene[:32]:32} {run.effects[:10]:10} {run.method:10} {grid:>9}"
+        line += f" {run.delta:9g}" if thresholds else ""
+        line += f" {1e3 * run.wall_time:11.3g} {1e3 * run.error:11.3g}"
+        if estimates:
+            line += f" {'-' if run.estimate is None else format(1e3 * run.estimate, '.3g'):>13}"
+        lines.append(f"{line}  {run.status}")
     lines += [f"not measured: {refused}" for refused in measured.refused]
     return "\n".join(lines)

@@ -1,7 +1,8 @@
 """Plots of the accuracy that a study measured: error against time, and the convergence of the iterations."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from textwrap import fill
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,31 +11,39 @@ from matplotlib.ticker import MaxNLocator
 
 from dlocore.accuracy.cost import pareto_front
 from dlocore.study.record import Run, Study
-from dlocore.study.style import COLOURS, DASHES, MARKS, SET_MARKS, new_figure, write_decimals
+from dlocore.study.style import COLOURS, DASHES, MARKS, SET_MARKS, name_of, new_figure, write_decimals
 
+_TITLE = 62  # characters in a line of a panel's title
+_CURVES = 3  # at most, for a legend on the axes: a longer one would hide some of them, and lies below
 _GRIDS = ("#56B4E9", "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#000000")
 
 
 def work_precision(study: Study) -> Figure:
-    """Draw error against time, in the plane and in space: a curve per method and set of effects, the front, a slope."""
+    """Draw error against time, in the plane and in space, with the front and a slope.
+
+    Each method has a curve for each set of effects and each threshold.
+    """
     kinds = sorted({run.dimensions for run in study.runs})
-    figure, panels = new_figure(6.2 * len(kinds), 5.0, 1, len(kinds))
+    many = len({name_of(run, study.runs) for run in study.runs}) > _CURVES
+    figure, panels = new_figure(6.2 * len(kinds), 7.0 if many else 5.0, 1, len(kinds))
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": 2} if many else {}
     for axes, dimensions in zip(panels, kinds, strict=True):
         runs = [run for run in study.runs if run.dimensions == dimensions and run.error > 0]
-        points = _work_precision_panel(axes, runs)
+        points = _work_precision_panel(axes, runs, study.runs)
         _front(axes, points)
         scenes = len({run.scene for run in runs})
         where = "in the plane" if dimensions == 2 else "in space"
-        axes.set_title(f"{where}, {scenes} scene{'s' if scenes > 1 else ''}: {_finding(points)}")
+        title = f"{where}, {scenes} scene{'s' if scenes > 1 else ''}: {_finding(points)}"
+        axes.set_title(fill(title, _TITLE))
         axes.set(xscale="log", yscale="log", xlabel="time of a solve [ms]", ylabel="largest error [mm]")
         write_decimals(axes.xaxis, axes.yaxis)
         axes.grid(alpha=0.25, which="both", linewidth=0.5)
-        axes.legend(fontsize=8)
+        axes.legend(fontsize=8, **place)
     return figure
 
 
 class Point(NamedTuple):
-    """A method with a set of effects on a grid.
+    """A method with a set of effects and a threshold on a grid.
 
     It has the geometric means of time [ms] and error [mm] over the scenes, and the largest error [mm].
     """
@@ -46,16 +55,19 @@ class Point(NamedTuple):
     largest: float
 
 
-def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
-    """Draw every run faintly and the geometric mean over the scenes strongly; return the means of the solved runs."""
+def _work_precision_panel(axes: Axes, runs: Sequence[Run], of: Sequence[Run]) -> list[Point]:
+    """Draw every run faintly and the geometric mean over the scenes strongly; return the means of the solved runs.
+
+    The marks and names are those of all panels, whose runs are `of`.
+    """
     points: list[Point] = []
-    sets = list(dict.fromkeys(run.effects for run in runs))
-    for method, effects in dict.fromkeys((run.method, run.effects) for run in runs):
-        number = sets.index(effects)
+    sets = list(dict.fromkeys((run.effects, run.delta) for run in of))
+    for method, effects, delta in dict.fromkeys((run.method, run.effects, run.delta) for run in runs):
+        number = sets.index((effects, delta))
         colour, dashes = COLOURS[method], DASHES[number % len(DASHES)]
         mark = SET_MARKS[number % len(SET_MARKS)] or MARKS[method]
-        name = method if len(sets) == 1 else f"{method}, effects {effects}"
-        mine = [run for run in runs if (run.method, run.effects) == (method, effects)]
+        mine = [run for run in runs if (run.method, run.effects, run.delta) == (method, effects, delta)]
+        name = name_of(mine[0], of)
         good = [run for run in mine if run.status == "converged"]
         for run in mine:
             axes.errorbar(
@@ -69,8 +81,8 @@ def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
             if len({run.scene for run in group}) < len({run.scene for run in mine}):
                 continue  # a mean over other scenes than its neighbours
             time, error = (
-                float(np.exp(np.mean(np.log([1e3 * getattr(run, name) for run in group]))))
-                for name in ("wall_time", "error")
+                float(np.exp(np.mean(np.log([1e3 * getattr(run, of_what) for run in group]))))
+                for of_what in ("wall_time", "error")
             )
             largest = 1e3 * max(run.error for run in group)
             curve.append(Point(time, error, name, f"{grid[0]} × {grid[1]}", largest))
@@ -80,6 +92,8 @@ def _work_precision_panel(axes: Axes, runs: Sequence[Run]) -> list[Point]:
         if len(curve) < len(mine):
             axes.plot([], [], mark, color=colour, alpha=0.3, markersize=3.5, label=f"{name}, each scene")
         points += curve
+    if any(run.status != "converged" for run in runs):
+        axes.plot([], [], "o", color="#666666", markerfacecolor="none", markersize=3.5, label="open: did not converge")
     return points
 
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import NullFormatter
 
 from dlocore.accuracy.cost import exponent
 from dlocore.study.record import Run, Scaled, Study
-from dlocore.study.style import COLOURS, MARKS, new_figure, write_decimals
+from dlocore.study.style import COLOURS, MARKS, name_of, new_figure, write_decimals
 
 _PHASES = {
     "setup": "#999999",
@@ -24,13 +24,16 @@ _WORK = {"march": "its steps", "spacetime": "its iterations", "paper": "its iter
 
 
 def phases(study: Study) -> Figure:
-    """Draw the time by phase, stacked, for each method and grid; the median over the scenes."""
+    """Draw the time by phase, stacked, for each method, set of effects, threshold and grid; the median over scenes."""
+    names = {run.key: name_of(run, study.runs) for run in study.runs}
     rows = []
-    for method in dict.fromkeys(run.method for run in study.runs):
-        for grid in sorted({(run.n_u, run.n_t) for run in study.runs if run.method == method}):
-            group = [run for run in study.runs if run.method == method and (run.n_u, run.n_t) == grid]
-            rows.append((f"{method}  {grid[0]} × {grid[1]}", group))
-    figure, (axes,) = new_figure(8.6, 1.7 + 0.32 * len(rows))
+    for name in dict.fromkeys(names.values()):
+        mine = [run for run in study.runs if names[run.key] == name]
+        for grid in sorted({(run.n_u, run.n_t) for run in mine}):
+            group = [run for run in mine if (run.n_u, run.n_t) == grid]
+            rows.append((f"{name}  {grid[0]} × {grid[1]}", group))
+    longest = max(len(name) for name, _ in rows)
+    figure, (axes,) = new_figure(7.2 + 0.08 * longest, 1.7 + 0.32 * len(rows))
     used = [phase for phase in _PHASES if any(phase in run.phases for run in study.runs)]
     for k, (_, group) in enumerate(rows):
         shares = _shares(group)

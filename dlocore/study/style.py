@@ -9,13 +9,22 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator
 
+from dlocore.study.record import Run
+
 # Okabe-Ito, one colour per method in all plots of a study; static/style.css has those of the landing page's methods
 COLOURS = {"march": "#0072B2", "spacetime": "#D55E00", "paper": "#CC79A7", "reference": "#009E73"}
 MARKS = {"march": "o", "spacetime": "s", "paper": "^", "reference": "D"}
-# one per set of effects; the first has the marker of the method
+# one per set of effects and threshold; the first has the marker of the method
 SET_MARKS = ("", "v", "P", "X", "*", "h")
 DASHES: tuple[str | tuple[int, tuple[int, int]], ...] = ("-", "--", "-.", ":", (0, (1, 3)), (0, (5, 5)))
 _LEAST = 3  # numbers on an axis
+
+
+def name_of(run: Run, runs: Sequence[Run]) -> str:
+    """Return the method of a run, with its set of effects and threshold if its study has several of them."""
+    effects = f", effects {run.effects}" if len({other.effects for other in runs}) > 1 else ""
+    several = len({other.delta for other in runs if other.method == run.method}) > 1
+    return run.method + effects + (f", δ = {run.delta:g} m" if several else "")
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Axes]]:

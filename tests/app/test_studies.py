@@ -170,6 +170,20 @@ def test_the_command_measures_writes_draws_and_compares(tmp_path: Path, capsys: 
     assert {file.name for file in (tmp_path / "plots").iterdir()} == {"work-precision.png", "phases.png"}
 
 
+def test_the_table_tells_thresholds_apart_and_has_the_estimates(capsys: pytest.CaptureFixture[str]) -> None:
+    quick = ["--grids", "9x13", "--parts", "runs", "--repeats", "1"]
+    assert cli.main(["study", str(SCENES / "paper-fig1.json"), *quick, "--deltas", "1e-5", "1e-3", "--estimate"]) == 0
+    head, *rows = capsys.readouterr().out.splitlines()
+    assert "delta [m]" in head
+    assert "estimate [mm]" in head
+    assert [row.split()[6] for row in rows] == ["1e-05", "1e-05", "0.001"]
+    assert all(float(row.split()[9]) > 0.0 for row in rows)
+    assert cli.main(["study", str(SCENES / "paper-fig1.json"), *quick, "--methods", "march"]) == 0
+    plain = capsys.readouterr().out
+    assert "delta" not in plain
+    assert "estimate" not in plain
+
+
 def test_a_study_of_the_service_can_be_compared_on_the_command_line(client: TestClient, tmp_path: Path) -> None:
     response = client.post(ADDRESS, json=QUICK, headers={"accept": "text/event-stream"})
     document = client.get(response.headers["location"]).content

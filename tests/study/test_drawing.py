@@ -99,6 +99,47 @@ def test_sets_of_effects_are_told_apart() -> None:
     assert "march" in [line.get_label() for line in axes.lines], "the only set needs no name"
 
 
+def several() -> Study:
+    """Return a study of two thresholds, in the plane with one set of effects and in space with another."""
+    return study(
+        runs=tuple(
+            run(method, n, time * n**2, 0.1 / n**2, effects=effects, dimensions=d, delta=delta)
+            for effects, d in (("auto", 2), ("all", 3))
+            for method, delta, time in (("march", 1e-5, 1e-5), ("spacetime", 1e-5, 2e-4), ("spacetime", 1e-3, 1e-4))
+            for n in (9, 17)
+        )
+    )
+
+
+def test_thresholds_are_told_apart() -> None:
+    names = [f"spacetime, effects auto, δ = {delta} m" for delta in ("1e-05", "0.001")]
+    flat, _ = accuracy_plots.work_precision(several()).axes
+    curves = {line.get_label(): line for line in flat.lines}
+    times = [list(curves[name].get_xdata()) for name in names]
+    assert times == [pytest.approx([1e3 * c * n**2 for n in (9, 17)]) for c in (2e-4, 1e-4)]
+    assert curves[names[0]].get_marker() != curves[names[1]].get_marker()
+    assert "march, effects auto" in curves, "a march has one threshold only, which needs no name"
+    (axes,) = cost_plots.phases(several()).axes
+    rows = [label.get_text() for label in axes.get_yticklabels()]
+    assert len(rows) == 12
+    assert all(f"{name}  9 × 18" in rows for name in names)
+
+
+def test_a_set_of_effects_has_one_marker_in_all_panels() -> None:
+    flat, space = accuracy_plots.work_precision(several()).axes
+    marker = {line.get_label(): line.get_marker() for axes in (flat, space) for line in axes.lines}
+    assert marker["march, effects auto"] != marker["march, effects all"]
+
+
+def test_a_long_legend_and_title_hide_nothing() -> None:
+    figure = accuracy_plots.work_precision(several())
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        assert axes.get_legend().get_window_extent().y1 <= axes.xaxis.get_tightbbox().y0
+        assert axes.title.get_window_extent().x0 >= 0
+        assert axes.title.get_window_extent().x1 <= figure.bbox.x1
+
+
 def written(axis: Axis) -> list[float]:
     """Return the numbers at an axis, within what is seen of it."""
     low, high = axis.get_view_interval()
@@ -163,5 +204,6 @@ def test_runs_that_did_not_converge_are_on_no_front() -> None:
     lost = study(runs=tuple(run("march", n, 1e-3, 1e-3, status="stalled") for n in (9, 17)))
     (axes,) = accuracy_plots.work_precision(lost).axes
     assert "nothing converged" in axes.get_title()
+    assert "open: did not converge" in [line.get_label() for line in axes.lines]
     (axes,) = accuracy_plots.convergence(study(runs=(run("spacetime", 9, 1e-3, 1.0, status="max_iterations"),))).axes
     assert "0 of 1" in axes.get_title()
