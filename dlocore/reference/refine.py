@@ -92,8 +92,21 @@ class Refined:
         return fine[:, ::2] + (fine[:, ::2] - self.levels[-2].taken.positions(t)) / 3.0
 
 
-def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Problem, Level], None]) -> Refined:
+def refine(
+    problem: Problem,
+    target: float,
+    watch: Watch,
+    on_level: Callable[[Problem, Level], None],
+    suffices: Callable[[Refined], bool] = lambda refined: True,
+) -> Refined:
     """Simulate rods with more and more elements until the estimated error is at most `target` [m].
+
+    Args:
+        problem: the posed scene.
+        target: [m].
+        watch: checked within the simulations.
+        on_level: called with each rod.
+        suffices: whether rods that agree are fine enough; if not, finer ones are simulated.
 
     Raises:
         what `watch.check` raises, except its `TimeIsUp`.
@@ -108,7 +121,7 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
         if motion.stopped == "time" and levels:
             return Refined(problem, tuple(levels), "time")
         if motion.stopped == "step" and levels:
-            return Refined(problem, tuple(levels), "step")
+            return Refined(problem, tuple(levels), "agreed" if ended == "agreed" else "step")
         stiffer = stiffened(problem, motion, stiffening)
         if stiffer > stiffening:
             stiffening = stiffer
@@ -124,7 +137,10 @@ def refine(problem: Problem, target: float, watch: Watch, on_level: Callable[[Pr
             break
         if len(levels) >= LEAST and levels[-1].estimate <= target:
             ended = "agreed"
-            break
+            if suffices(Refined(problem, tuple(levels), ended)):
+                break
+        else:
+            ended = "finest"
     return Refined(problem, tuple(levels), ended)
 
 

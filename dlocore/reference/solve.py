@@ -130,7 +130,12 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
             )
         )
 
-    refined = refine(problem, (1.0 - FITTED) * target, monitor, on_level)
+    def is_fitted(refined: Refined) -> bool:
+        missed = _surface(refined.problem, refined, FITTED * target).missed
+        monitor.phase("fit")
+        return refined.estimate + missed <= target
+
+    refined = refine(problem, (1.0 - FITTED) * target, monitor, on_level, is_fitted)
     refuse_meeting(refined)
     refined = replace(refined, astray=goes_astray(refined, target, monitor))
     monitor.phase("simulation")
