@@ -119,7 +119,8 @@ def _name(run: Run) -> str:
 
 def words(comparison: Comparison) -> str:
     """Return a comparison as text."""
-    lines = [f"{comparison.compared} runs compared; {len(comparison.worse)} changes for the worse"]
+    compared, worse = counted(comparison.compared, "run"), counted(len(comparison.worse), "change")
+    lines = [f"{compared} compared; {worse} for the worse"]
     lines += [f"not measured now: {run}" for run in comparison.missing]
     if not comparison.same_machine:
         lines.append("different machines: times are not compared")

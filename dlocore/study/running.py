@@ -102,21 +102,31 @@ class _Measuring:
             return step_by_step(scene, cancelled=self._cancelled)
         return finest_march(scene, patience=_TRUTH_PATIENCE, cancelled=self._cancelled)
 
+    def _effects_of(self, name: str) -> str:
+        """Return the name of a set of effects as an addition to that of a scene, if there are several sets."""
+        return f", effects {name}" if len(self._plan.effects) > 1 else ""
+
+    def _words(self, case: Case) -> str:
+        """Return a run in words that no other run of the study has."""
+        quality = case.scene.quality
+        several = len(self._plan.deltas) > 1 and quality.method != "march"
+        delta = f", delta {quality.delta:g}" if several else ""
+        return f"{case.name}{self._effects_of(case.effects)}: {quality.method}, {quality.n_u} x {quality.n_t}{delta}"
+
     def runs(self) -> tuple[Run, ...]:
         """Measure scenes over grids, thresholds, methods and sets of effects."""
         found = []
         for name, effects, scene in self._plan.variants():
             cases = list(self._plan.cases(name, effects, scene))
-            self.next(f"{name}: the converged motion")
+            self.next(f"{name}{self._effects_of(effects)}: the converged motion")
             try:
                 truth = self._truth(scene)
             except SceneError as error:
-                self.refused.append(f"{name}, effects {effects}: {error}")
+                self.refused.append(f"{name}{self._effects_of(effects)}: {error}")
                 self._done += len(cases)
                 continue
             for case in cases:
-                quality = case.scene.quality
-                what = f"{name}: {quality.method}, {quality.n_u} x {quality.n_t}"
+                what = self._words(case)
                 self.next(what)
                 try:
                     prediction, times = self._solved(case.scene)

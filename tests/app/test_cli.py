@@ -389,7 +389,7 @@ def test_a_comparison_with_nothing_in_common_is_none(tmp_path: Path, capsys: pyt
     quick = ["--methods", "march", "--parts", "runs", "--repeats", "1"]
     assert main(["study", scene, "--grids", "9x13", *quick, "-o", before]) == 0
     assert main(["study", scene, "--grids", "9x13", "7x11", *quick, "--compare", before]) == 0
-    assert "1 runs compared" in capsys.readouterr().out
+    assert "1 run compared; 0 changes for the worse" in capsys.readouterr().out
     assert main(["study", scene, "--grids", "7x11", *quick, "--compare", before]) == 2
     output = capsys.readouterr()
     assert "not measured now: scene: march, 9 x 13" in output.out

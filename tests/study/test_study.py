@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dlocore import Cancelled, Quality, SceneError, predict
+from dlocore import Cancelled, Quality, Scene, SceneError, predict
 from dlocore.study import record, running
 from dlocore.study.compare import compare, words
 from dlocore.study.judge import finest_march, largest_error, step_by_step
@@ -222,6 +222,23 @@ def test_what_is_not_allowed_is_named(asked: dict[str, object], field: str) -> N
     with pytest.raises(SceneError) as caught:
         StudyPlan(**asked)  # type: ignore[arg-type]
     assert caught.value.field == field
+
+
+def test_every_part_and_every_refusal_is_named_differently(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(scene: Scene, **options: object) -> None:
+        raise SceneError("quality.n_u", 9, "more")
+
+    monkeypatch.setattr("dlocore.study.running.predict", refuse)
+    monkeypatch.setattr("dlocore.study.running.finest_march", lambda scene, **options: None)
+    sets = {"auto": {}, "no drag": {"drag": "off"}}
+    news: list[str] = []
+    study = run_study(
+        StudyPlan(scenes={"a": paper_case(0.0)}, grids=GRIDS[:1], deltas=(1e-3, 1e-6), effects=sets, parts=("runs",)),  # type: ignore[arg-type]
+        on_progress=lambda done, total, what: news.append(what),
+    )
+    assert len(set(news)) == len(news) == 1 + 2 * (1 + 3) + 1
+    assert len(set(study.refused)) == 2 * 3
+    assert study.refused[-1].startswith("a, effects no drag: spacetime, 9 x 13, delta 1e-06: quality.n_u")
 
 
 def test_a_study_stops_when_asked() -> None:
