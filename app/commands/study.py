@@ -151,14 +151,17 @@ def _switches(given: str) -> Mapping[str, Switch]:
 
 
 def _table(measured: Any) -> str:
-    """Return the runs as a table, with thresholds where they differ and error estimates where there are any."""
+    """Return the results as text: a table of the runs, and lines for the costs by size and by effect.
+
+    The table has thresholds where they differ, and error estimates where there are any.
+    """
     thresholds = len({run.delta for run in measured.runs}) > 1
     estimates = any(run.estimate is not None for run in measured.runs)
     head = f"{'scene':32} {'effects':10} {'method':10} {'grid':>9}"
     head += f" {'delta [m]':>9}" if thresholds else ""
     head += f" {'time [ms]':>11} {'error [mm]':>11}"
     head += f" {'estimate [mm]':>13}" if estimates else ""
-    lines = [f"{head}  status"]
+    lines = [f"{head}  status"] if measured.runs else []
     for run in measured.runs:
         grid = f"{run.n_u} x {run.n_t}"
         line = f"{run.scene[:32]:32} {run.effects[:10]:10} {run.method:10} {grid:>9}"
@@ -167,5 +170,11 @@ def _table(measured: Any) -> str:
         if estimates:
             line += f" {'-' if run.estimate is None else format(1e3 * run.estimate, '.3g'):>13}"
         lines.append(f"{line}  {run.status}")
+    for row in measured.scaling:
+        part = row.method if row.method == "march" else f"one iteration of {row.method}"
+        lines.append(f"cost against {row.variable} = {row.value:g}: {part} takes {1e3 * row.wall_time:.3g} ms")
+    for cost in measured.effects:
+        times = f"{1e3 * cost.present:.3g} ms, without it {1e3 * cost.absent:.3g} ms"
+        lines.append(f"cost of {cost.effect}: a march with it takes {times}")
     lines += [f"not measured: {refused}" for refused in measured.refused]
     return "\n".join(lines)

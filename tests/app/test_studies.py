@@ -184,6 +184,26 @@ def test_the_table_tells_thresholds_apart_and_has_the_estimates(capsys: pytest.C
     assert "estimate" not in plain
 
 
+def test_costs_by_size_and_by_effect_are_printed_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scaling = tuple(
+        record.Scaled(variable="n_u", value=9.0, method=method, wall_time=2e-3, spread=0.0)
+        for method in ("march", "spacetime")
+    )
+    found = record.Study(
+        machine={}, source="", measured_at="", duration=1.0, judge="march", runs=(), scaling=scaling,
+        effects=(record.EffectCost(effect="drag", present=3e-3, absent=1e-3),),
+    )  # fmt: skip
+    monkeypatch.setattr("dlocore.study.running.run_study", lambda plan, **options: found)
+    assert cli.main(["study", "--parts", "scaling", "effects"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "cost against n_u = 9: march takes 2 ms",
+        "cost against n_u = 9: one iteration of spacetime takes 2 ms",
+        "cost of drag: a march with it takes 3 ms, without it 1 ms",
+    ]
+
+
 def test_a_study_of_the_service_can_be_compared_on_the_command_line(client: TestClient, tmp_path: Path) -> None:
     response = client.post(ADDRESS, json=QUICK, headers={"accept": "text/event-stream"})
     document = client.get(response.headers["location"]).content
