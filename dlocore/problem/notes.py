@@ -1,6 +1,7 @@
 """Notes on a scene as it was given, whatever its motion."""
 
 import math
+from collections.abc import Iterator
 from typing import cast
 
 import numpy as np
@@ -247,11 +248,7 @@ def _of_overshoots(scene: Scene) -> list[str]:
 def _of_close_times(scene: Scene) -> list[str]:
     """Return notes on waypoints whose times are so close that noise or a late time throws a smooth path off."""
     notes = []
-    for i, grasp in enumerate(scene.grasps):
-        path = grasp.path
-        if not isinstance(path, Waypoints) or path.profile != "spline":
-            continue
-        times, given = cast(Floats, path.times), cast(Floats, path.positions)
+    for i, path, times, given in _smooth_paths(scene):
         usual = float(np.median(np.diff(times)))
         close = np.append(False, np.diff(times) < CLOSE * usual)
         if not close.any() or (~close).sum() < 2:
@@ -269,7 +266,7 @@ def _of_close_times(scene: Scene) -> list[str]:
             notes.append(
                 f"primitives[{i}].path.times[{j}] is {gap:.2g} s after the one before it, others are {usual:.2g} s "
                 f"apart: their noise, or a late time, throws the smooth path off by up to {in_mm(thrown[k])}, at "
-                f"{grasp.start + t[k]:.4g} s. Leave this waypoint out"
+                f"{scene.grasps[i].start + t[k]:.4g} s. Leave this waypoint out"
             )
     return notes
 
@@ -281,11 +278,7 @@ def _of_scatter(scene: Scene) -> list[str]:
     noise is as far from both.
     """
     notes = []
-    for i, grasp in enumerate(scene.grasps):
-        path = grasp.path
-        if not isinstance(path, Waypoints) or path.profile != "spline":
-            continue
-        times, given = cast(Floats, path.times), cast(Floats, path.positions)
+    for i, path, times, given in _smooth_paths(scene):
         near, far = _scatter(times, given, 1), _scatter(times, given, 2)
         if len(far) < _FEW:
             continue
@@ -301,6 +294,13 @@ def _of_scatter(scene: Scene) -> list[str]:
                 "smooth its positions first"
             )
     return notes
+
+
+def _smooth_paths(scene: Scene) -> Iterator[tuple[int, Waypoints, Floats, Floats]]:
+    """Yield index, path, times (k,) [s] and positions (k, 3) [m] of each grasp that follows waypoints smoothly."""
+    for i, grasp in enumerate(scene.grasps):
+        if isinstance(grasp.path, Waypoints) and grasp.path.profile == "spline":
+            yield i, grasp.path, cast(Floats, grasp.path.times), cast(Floats, grasp.path.positions)
 
 
 def _scatter(times: Floats, given: Floats, stride: int) -> Floats:
