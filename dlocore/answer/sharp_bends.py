@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 FALLS_SHORT = 0.25  # of the curvature by the moment: a surface that shows so much less of it gets a note, if the ...
 GENTLE = 50.0  # ... radius is less than this many diameters
 _SHARE = 0.5  # of what the curvature misses: the error of a moment was less on grids that agree
+_DAMPED = 0.1  # of the curvature by the moment: with more from damping, it does not tell the curvature
+_WHILE = 10  # part of the motion in whose middle damping is judged: a rate passes through zero now and then
 _INSTANT = 1e-5  # of the horizon, between two curvatures of which the rate is found
 
 
@@ -65,7 +67,8 @@ class HiddenBend(NamedTuple):
 def sharpest_hidden(problem: Problem, surface: SplineSurface, grasps: tuple[GraspReaction, ...]) -> HiddenBend | None:
     """Return the sharpest bend beside a gripper of which the surface shows too little, if there is one.
 
-    Each gripper is judged at the time of the largest curvature by its moment, without what bending damping may add.
+    Each gripper is judged at the time of the largest curvature by its moment, while bending damping is but a small part
+    of that.
     """
     found = []
     cable, stiffness = problem.scene.cable, _stiffness(problem)
@@ -79,10 +82,13 @@ def sharpest_hidden(problem: Problem, surface: SplineSurface, grasps: tuple[Gras
         by_moment, shown = _curvatures(problem, i, grasp.moment, partial(_derivative, surface, times))
         sizes = np.linalg.norm(by_moment, axis=1)
         if cable.bending_damping > 0.0:
+            from scipy.ndimage import maximum_filter1d  # slow to import
+
             around = (times + _INSTANT * surface.horizon * np.array([[-1.0], [1.0]])).clip(0.0, surface.horizon)
             was, becomes = (_curvatures(problem, i, grasp.moment, partial(_derivative, surface, t))[1] for t in around)
             rates = np.linalg.norm(becomes - was, axis=1) / (around[1] - around[0])
-            sizes -= cable.bending_damping / stiffness * rates
+            damped = cable.bending_damping / stiffness * maximum_filter1d(rates, 1 + len(rates) // _WHILE)
+            sizes[damped > _DAMPED * sizes] = 0.0
         k = int(np.argmax(sizes))
         error = None if grasp.moment_error is None else float(grasp.moment_error[k]) / stiffness
         bend = HiddenBend(i, float(sizes[k]), error, float(np.linalg.norm(shown[k])))
