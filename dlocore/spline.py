@@ -41,6 +41,18 @@ def spline_at(knots: Floats, control_points: Floats, x: ArrayLike, derivative: i
     return np.asarray(BSpline(knots, control_points, DEGREE)(np.asarray(x, dtype=float), derivative))
 
 
+def through_others(x: Floats, values: Floats, k: NDArray[np.intp], others: NDArray[np.intp]) -> Floats:
+    """Return the values (n, d), at x[k] (n,), of the cubics through the four `others` (n, 4) of values (m, d) at x."""
+    found = np.zeros((len(k), values.shape[1]))
+    for a in range(4):
+        share = np.ones(len(k))
+        for b in range(4):
+            if b != a:
+                share *= (x[k] - x[others[:, b]]) / (x[others[:, a]] - x[others[:, b]])
+        found += share[:, None] * values[others[:, a]]
+    return found
+
+
 def nearest_line(x: Floats, u: Floats, values: Floats) -> Floats:
     """Return values (n,) at x (n,): the piecewise linear function nearest to that with `values` (k,) at u (k,).
 

@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline
 from dlocore.errors import SceneError
 from dlocore.recordings import Recording
 from dlocore.shape.smoothing import smooth
+from dlocore.spline import through_others
 
 Floats = NDArray[np.float64]
 
@@ -88,14 +89,7 @@ def _leaps(t: Floats, x: Floats) -> Floats:
     around = np.clip(np.arange(len(t)), 2, len(t) - 3)[:, None] + np.array([-2, -1, 0, 1, 2])
     own = np.arange(len(t))[:, None]
     others = around[around != own].reshape(len(t), 4)
-    value = np.zeros_like(x)
-    for a in range(4):
-        share = np.ones(len(t))
-        for b in range(4):
-            if b != a:
-                share *= (t - t[others[:, b]]) / (t[others[:, a]] - t[others[:, b]])
-        value += share[:, None] * x[others[:, a]]
-    return np.asarray(np.linalg.norm(x - value, axis=1))
+    return np.asarray(np.linalg.norm(x - through_others(t, x, own[:, 0], others), axis=1))
 
 
 def _smoothed(t: Floats, x: Floats, times: Floats) -> CubicSpline:

@@ -11,6 +11,7 @@ from dlocore.scene.obstacles import Box, Cylinder, Obstacle
 from dlocore.scene.paths import Move, Waypoints
 from dlocore.scene.scene import AUTO_TARGET, ControlPoints, Grasp, Scene, Straight
 from dlocore.shape.shape import StartCurve, start_curve
+from dlocore.spline import through_others
 from dlocore.words import in_m_per_s2, in_mm
 
 Floats = NDArray[np.float64]
@@ -308,12 +309,8 @@ def _scatter(times: Floats, given: Floats, stride: int) -> Floats:
     k = np.arange(2 * stride, len(times) - 2 * stride)
     way = np.linalg.norm(given[k + stride] - given[k - stride], axis=1)
     k = k[way > _MOVES * way.mean()] if way.any() else k[:0]
-    around = [k + a * stride for a in (-2, -1, 1, 2)]
-    through = np.zeros((len(k), 3))
-    for a in around:
-        share = np.prod([(times[k] - times[b]) / (times[a] - times[b]) for b in around if b is not a], axis=0)
-        through += share[:, None] * given[a]
-    return np.asarray(np.linalg.norm(given[k] - through, axis=1))
+    around = k[:, None] + stride * np.array([-2, -1, 1, 2])
+    return np.asarray(np.linalg.norm(given[k] - through_others(times, given, k, around), axis=1))
 
 
 def _root_mean_square(times: Floats, x: Floats) -> float:
