@@ -130,18 +130,23 @@ def reference(problem: Problem, monitor: Monitor) -> Prediction:
             )
         )
 
-    def is_fitted(refined: Refined) -> bool:
-        missed = _surface(refined.problem, refined, FITTED * target).missed
-        monitor.phase("fit")
-        return refined.estimate + missed <= target
+    fits: dict[Level, Fit] = {}  # by the finest rod
 
-    refined = refine(problem, (1.0 - FITTED) * target, monitor, on_level, is_fitted)
+    def fitted(refined: Refined) -> Fit:
+        finest = refined.levels[-1]
+        if finest not in fits:
+            fits[finest] = _surface(refined.problem, refined, FITTED * target)
+            monitor.phase("fit")
+        return fits[finest]
+
+    def suffices(refined: Refined) -> bool:
+        return refined.estimate + fitted(refined).missed <= target
+
+    refined = refine(problem, (1.0 - FITTED) * target, monitor, on_level, suffices)
     refuse_meeting(refined)
     refined = replace(refined, astray=goes_astray(refined, target, monitor))
     monitor.phase("simulation")
-    fitted = _surface(refined.problem, refined, FITTED * target)
-    monitor.phase("fit")
-    return _prediction(refined, fitted, target, monitor)
+    return _prediction(refined, fitted(refined), target, monitor)
 
 
 def _surface(problem: Problem, refined: Refined, tolerance: float) -> Fit:
