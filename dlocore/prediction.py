@@ -113,7 +113,7 @@ class Prediction:
         """Return a note if the cable bends beside a gripper more sharply than the surface shows."""
         from dlocore.answer.sharp_bends import sharpest_hidden  # imports the compiler
 
-        if self.status != "converged" or self.level is None:
+        if self.status != "converged" or self.level is None or all(g.hold == "point" for g in self.scene.grasps):
             return []
         bend = sharpest_hidden(self.level.problem, self.surface, self.grasps)
         if bend is None:

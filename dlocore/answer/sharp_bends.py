@@ -45,8 +45,8 @@ def missing_moments(problem: Problem, knots: Floats, control_points: Floats, mom
 
     found = np.zeros(len(moments))
     for i in _bending(problem, knots, list(moments)):
-        by_moment, shown = _curvatures(problem, i, moments[i][None], derivative)
-        found[i] = _SHARE * _stiffness(problem) * np.linalg.norm(by_moment - shown)
+        tangent, shown = _beside(problem, i, derivative)
+        found[i] = _SHARE * _stiffness(problem) * np.linalg.norm(_by_moment(problem, moments[i], tangent) - shown)
     return found
 
 
@@ -79,13 +79,13 @@ def sharpest_hidden(problem: Problem, surface: SplineSurface, grasps: tuple[Gras
         if np.linalg.norm(grasp.moment, axis=1).max() <= gentle * stiffness:
             continue
         times = grasp.times.clip(0.0, surface.horizon)
-        by_moment, shown = _curvatures(problem, i, grasp.moment, partial(_derivative, surface, times))
-        sizes = np.linalg.norm(by_moment, axis=1)
+        tangents, shown = _beside(problem, i, partial(_derivative, surface, times))
+        sizes = np.linalg.norm(_by_moment(problem, grasp.moment, tangents), axis=1)
         if cable.bending_damping > 0.0:
             from scipy.ndimage import maximum_filter1d  # slow to import
 
             around = (times + _INSTANT * surface.horizon * np.array([[-1.0], [1.0]])).clip(0.0, surface.horizon)
-            was, becomes = (_curvatures(problem, i, grasp.moment, partial(_derivative, surface, t))[1] for t in around)
+            was, becomes = (_beside(problem, i, partial(_derivative, surface, t))[1] for t in around)
             rates = np.linalg.norm(becomes - was, axis=1) / (around[1] - around[0])
             damped = cable.bending_damping / stiffness * maximum_filter1d(rates, 1 + len(rates) // _WHILE)
             sizes[damped > _DAMPED * sizes] = 0.0
@@ -118,16 +118,15 @@ def _bending(problem: Problem, knots: Floats, moments: Sequence[Floats]) -> list
     ]
 
 
-def _curvatures(
-    problem: Problem, i: int, moments: Floats, derivative: Callable[[Floats, int], Floats]
-) -> tuple[Floats, Floats]:
-    """Return the curvatures t x kappa (k, 3) [1/m] beside a grasp, by its moments (k, 3) [N m] and as they are shown.
+def _by_moment(problem: Problem, moments: Floats, tangents: Floats) -> Floats:
+    """Return the curvatures t x kappa (k, 3) [1/m] beside a grasp by its moments (3,) or (k, 3) [N m]."""
+    return (moments - np.sum(moments * tangents, axis=-1, keepdims=True) * tangents) / _stiffness(problem)
 
-    Args:
-        problem: the posed scene.
-        i: index of the grasp.
-        moments: (k, 3) [N m].
-        derivative: returns the derivative (k, m, 3) of an order, 1 or 2, of the cable's shape at u (m,) [m].
+
+def _beside(problem: Problem, i: int, derivative: Callable[[Floats, int], Floats]) -> tuple[Floats, Floats]:
+    """Return the tangents (k, 3) and the curvatures t x kappa (k, 3) [1/m] that are shown beside the grasp i.
+
+    `derivative` returns the derivative (k, m, 3) of an order, 1 or 2, of the cable's shape at u (m,) [m].
     """
     length = problem.scene.cable.length
     sides = np.array([-1.0, 1.0])
@@ -136,5 +135,4 @@ def _curvatures(
     slope, second = derivative(u[inside], 1), derivative(u[inside], 2)
     bend = np.cross(slope, second) / np.sum(slope**2, axis=-1, keepdims=True)
     tangent = slope[:, 0] / np.linalg.norm(slope[:, 0], axis=-1, keepdims=True)
-    across = moments - np.sum(moments * tangent, axis=-1, keepdims=True) * tangent
-    return across / _stiffness(problem), np.einsum("s,ksd->kd", -sides[inside], bend)
+    return tangent, np.einsum("s,ksd->kd", -sides[inside], bend)
