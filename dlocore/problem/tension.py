@@ -49,8 +49,8 @@ def balanced(scene: Scene, grid: Grid, u: Floats, ends: Sequence[float] = ()) ->
     """
     tables, knots, length = grid.tables, grid.knots[1:-1], float(grid.knots[-1])
     sides = _held_sides(scene)
-    tips = _in_tips(scene, grid)
-    inside = np.unique([u for u in scene.places if 0.0 < u < length and not (u in tips and u in _held(scene))])
+    covered = _in_tips(scene, grid) & set(_held(scene))  # by the force of a held direction
+    inside = np.unique([u for u in scene.places if 0.0 < u < length and u not in covered])
     # a place in a tip has no knot: the integral over its step has to stop there
     points, weights = gauss_points(np.sort(np.concatenate([grid.knots, inside])), *GAUSS_3)
     over = _basis(knots, points)
