@@ -118,4 +118,4 @@ def test_finer_grids_agree_on_where_a_sharply_bent_wire_goes_on() -> None:
     off = [float(np.linalg.norm(one - ends_at[-1], axis=1).max()) for one in ends_at[:-1]]
     assert off[0] < 5e-3  # 13 mm where each grid let the wire yield anew
     assert off[1] < 1.5e-3  # 4 mm
-    assert off[2] < 0.5e-3  # 2.5 mm
+    assert off[2] < 0.17e-3  # 2.5 mm; 0.15, as docs/stability.md says

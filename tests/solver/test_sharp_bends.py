@@ -49,6 +49,7 @@ def test_the_default_quality_is_told_what_it_hides() -> None:
     limp = told(predict(replace(between(1e-6), quality=Quality())))
     assert coarse == pytest.approx((41.0, 19.0), rel=0.02)  # as docs/api.md says
     assert limp == pytest.approx((264.0, 20.0), rel=0.02)
+    assert told(solved(between(1e-6), 129)) == pytest.approx((116.0, 80.0), rel=0.01)
     fine = solved(between(1e-5), 129)
     shown = fine.surface.curvature(np.linspace(0.0, 1.0, 2001), np.linspace(0.0, fine.surface.horizon, 201)).max()
     by_moment = max(np.linalg.norm(grasp.moment, axis=1).max() for grasp in fine.grasps) / 1e-5
